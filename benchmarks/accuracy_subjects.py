@@ -94,7 +94,7 @@ def orders(shared: Path | None) -> list[Panel]:
 def measured(name: str, shared: Path) -> list[Point]:
     """Median difference from the measured lines of a catalogue inside the range that the constants are held against."""
     import rotor
-    from rotor.formats.line_tables import catalogue
+    from rotor.formats.lines.line_tables import catalogue
     from rotor.formats.molecules.library import library_molecule
     from rotor.formats.spcat.compare import compare
     from rotor.formats.spcat.text.cat import read_cat

@@ -295,7 +295,7 @@ def _emission(scene: Any, request: Any, answer: Any) -> Reference:
 
 
 def _fit(scene: Any, request: Any, answer: Any) -> Reference:
-    from rotor.formats.fit_request import answer_fit
+    from rotor.formats.fits.fit_request import answer_fit
 
     exact = answer_fit(replace(request, options=replace(request.options, tolerance=1e-13)))
     return maximum(answer.fit.calculated_mhz, exact.fit.calculated_mhz), "a search to 1e-13"

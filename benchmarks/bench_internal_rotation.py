@@ -23,7 +23,7 @@ from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.search import FitOptions
 from rotor.fitting.top_constants import TopConstants
-from rotor.formats.belgi import read_belgi_levels
+from rotor.formats.internal_rotation.belgi import read_belgi_levels
 from rotor.quantum.internal_rotation.labels import counted_ka_kc
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.truncation import truncation_mhz

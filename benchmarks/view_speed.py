@@ -24,7 +24,7 @@ import msgspec
 import numpy as np
 
 from rotor.fitting.assignment import assignments
-from rotor.formats.assigned_lines import write_assigned_lines
+from rotor.formats.lines.assigned_lines import write_assigned_lines
 from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.molecules.molecule_writer import write_molecule_file
 from rotor.observed.spectrum import observed_spectrum

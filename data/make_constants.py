@@ -24,8 +24,8 @@ from rotor.fitting.assignment import Assignments, assignments, merged
 from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.result import Fit
-from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.atomic_write import open_atomic
+from rotor.formats.lines.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.tops.constants import Constants

@@ -20,7 +20,7 @@ from rotor.fitting.criteria import aicc
 from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import with_names
 from rotor.fitting.result import Fit
-from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+from rotor.formats.lines.assigned_lines import QUANTA, read_assigned_lines
 from rotor.tops.constants import Constants
 
 PAGE = Path(__file__).with_name("validation") / "fitted_catalogues.md"

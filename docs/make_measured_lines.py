@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 import rotor
-from rotor.formats.line_tables import catalogue
+from rotor.formats.lines.line_tables import catalogue
 from rotor.formats.molecules.library import library_molecule
 from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.spcat.compare import Agreement, Comparison, agreement, compare

@@ -18,8 +18,8 @@ import numpy as np
 from rotor.fitting.choose import choose_constants
 from rotor.fitting.fit import FitOptions
 from rotor.fitting.result import Fit
-from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
-from rotor.formats.family_file import read_family
+from rotor.formats.fits.family_file import read_family
+from rotor.formats.lines.assigned_lines import QUANTA, read_assigned_lines
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope
 from rotor.structures.family import Family, family

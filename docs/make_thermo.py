@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import rotor
-from rotor.plots.heat_capacity import Panel, Points, curve_temperatures, picture
+from rotor.plots.energies.heat_capacity import Panel, Points, curve_temperatures, picture
 from rotor.thermodynamics.functions import GAS_CONSTANT, ThermoFunctions, thermodynamic_functions
 from rotor.thermodynamics.sums.classical_limit import classical_limit, rotational_temperatures_k
 from rotor.thermodynamics.sums.classical_onset import classical_above_k

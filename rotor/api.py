@@ -96,9 +96,10 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.fluids.request import FluidRequest as FluidRequest
     from rotor.fluids.request import NewBox as NewBox
     from rotor.fluids.request import answer_fluid as answer_fluid
-    from rotor.formats.assigned_lines import read_assigned_lines as read_assigned_lines
     from rotor.formats.catalogue.cat_species import read_cat_species as read_cat_species
-    from rotor.formats.family_file import read_family as read_family
+    from rotor.formats.fits.family_file import read_family as read_family
+    from rotor.formats.lines.assigned_lines import read_assigned_lines as read_assigned_lines
+    from rotor.formats.lines.streamed_lines import stream_lines as stream_lines
     from rotor.formats.spcat.compare import agreement as agreement
     from rotor.formats.spcat.compare import compare as compare
     from rotor.formats.spcat.fits.fit_input import fitted_file as fitted_file
@@ -106,7 +107,6 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.formats.spcat.text.egy import read_egy as read_egy
     from rotor.formats.spectra.axis import ReadChoices as ReadChoices
     from rotor.formats.spectra.read import read_spectrum as read_spectrum
-    from rotor.formats.streamed_lines import stream_lines as stream_lines
     from rotor.geometry import rotations as rotations
     from rotor.geometry.base_pair_steps import mean_rotation as mean_rotation
     from rotor.geometry.base_pair_steps import persistence_steps as persistence_steps
@@ -155,19 +155,19 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.observed.species import strength_from_einstein as strength_from_einstein
     from rotor.observed.spectrum import observed_spectrum as observed_spectrum
     from rotor.observed.start import start_components as start_components
-    from rotor.plots.alignment import alignment_figure as alignment_figure
-    from rotor.plots.assign import assignment_figure as assignment_figure
-    from rotor.plots.fit import fit_figure as fit_figure
-    from rotor.plots.gas import band_figure as band_figure
-    from rotor.plots.gas import equipartition_figure as equipartition_figure
-    from rotor.plots.heat_capacity import Panel as Panel
-    from rotor.plots.heat_capacity import heat_capacity_figure as heat_capacity_figure
-    from rotor.plots.over import loomis_wood_figure as loomis_wood_figure
+    from rotor.plots.energies.heat_capacity import Panel as Panel
+    from rotor.plots.energies.heat_capacity import heat_capacity_figure as heat_capacity_figure
+    from rotor.plots.energies.stark import stark_figure as stark_figure
+    from rotor.plots.energies.torsion import torsion_figure as torsion_figure
+    from rotor.plots.motion.alignment import alignment_figure as alignment_figure
+    from rotor.plots.motion.gas import band_figure as band_figure
+    from rotor.plots.motion.gas import equipartition_figure as equipartition_figure
+    from rotor.plots.motion.polhodes import polhode_figure as polhode_figure
     from rotor.plots.picture import use_style as use_style
-    from rotor.plots.polhodes import polhode_figure as polhode_figure
-    from rotor.plots.stark import stark_figure as stark_figure
+    from rotor.plots.spectra.assign import assignment_figure as assignment_figure
+    from rotor.plots.spectra.fit import fit_figure as fit_figure
+    from rotor.plots.spectra.over import loomis_wood_figure as loomis_wood_figure
     from rotor.plots.structure import structure_figure as structure_figure
-    from rotor.plots.torsion import torsion_figure as torsion_figure
     from rotor.quantum.basis.labelled import Basis as Basis
     from rotor.quantum.basis.labelled import rotation_labels as rotation_labels
     from rotor.quantum.blocks import linear_blocks as linear_blocks

@@ -22,7 +22,7 @@ TABLE = "rotor.table:Table"
 MOTION = "rotor.classical.integrators.method:Motion"
 CATALOGUE = "rotor.formats.spcat.text.catalogue:Catalogue"
 LEVELS = "rotor.quantum.request:SelectedLevels"
-HITRAN = "rotor.formats.hitran:HitranLines"
+HITRAN = "rotor.formats.lines.hitran:HitranLines"
 
 FOLDER, PACKAGE = Path(__file__).parent, "rotor.formats"
 Writer = Callable[[Any, str | os.PathLike[str], Mapping[str, Any]], None]
@@ -50,32 +50,35 @@ FORMATS = (
         (".cat", ".cat.gz"),
         "rotor.formats.spcat.text.cat:read_cat",
         {
-            LINES: "rotor.formats.line_tables:write_catalogue",
-            CATALOGUE: "rotor.formats.line_tables:write_read_catalogue",
+            LINES: "rotor.formats.lines.line_tables:write_catalogue",
+            CATALOGUE: "rotor.formats.lines.line_tables:write_read_catalogue",
         },
     ),
     Format(
         "records of HITRAN",
         (".hitran", ".hitran.gz"),
-        "rotor.formats.hitran:read_hitran",
-        {LINES: "rotor.formats.line_tables:write_hitran_lines", HITRAN: "rotor.formats.line_tables:write_records"},
+        "rotor.formats.lines.hitran:read_hitran",
+        {
+            LINES: "rotor.formats.lines.line_tables:write_hitran_lines",
+            HITRAN: "rotor.formats.lines.line_tables:write_records",
+        },
     ),
     Format(
         "records of HITRAN",
         (".par", ".par.gz", ".data"),
-        "rotor.formats.hitran:read_hitran",
-        recognises="rotor.formats.hitran:is_hitran_file",
+        "rotor.formats.lines.hitran:read_hitran",
+        recognises="rotor.formats.lines.hitran:is_hitran_file",
     ),
     Format(
         "lines of ExoMol",
         (".states",),
-        "rotor.formats.exomol_writer:refuse_exomol",
-        {LINES: "rotor.formats.exomol_writer:write_exomol"},
+        "rotor.formats.lines.exomol_writer:refuse_exomol",
+        {LINES: "rotor.formats.lines.exomol_writer:write_exomol"},
     ),
     Format(
         "packed lines of ExoMol",
         (".states.bz2", ".trans", ".trans.bz2"),
-        "rotor.formats.exomol_writer:refuse_exomol",
+        "rotor.formats.lines.exomol_writer:refuse_exomol",
     ),
     Format("input of SPFIT and SPCAT", (".par", ".var", ".int"), "rotor.formats.read_write:read_spcat_top"),
     Format("measured lines of SPFIT", (".lin", ".lin.gz"), "rotor.formats.spcat.text.lin:read_lin"),
@@ -92,18 +95,18 @@ FORMATS = (
         "rotor.formats.lamda:refuse_lamda",
         recognises="rotor.formats.lamda:is_lamda_file",
     ),
-    Format("input and output of XIAM", (".xi", ".xo", ".xo.gz"), "rotor.formats.xiam:read_xiam"),
+    Format("input and output of XIAM", (".xi", ".xo", ".xo.gz"), "rotor.formats.internal_rotation.xiam:read_xiam"),
     Format(
         "input of westerfit",
         (".inp",),
-        "rotor.formats.westerfit:read_westerfit",
-        recognises="rotor.formats.westerfit:is_westerfit_file",
+        "rotor.formats.internal_rotation.westerfit:read_westerfit",
+        recognises="rotor.formats.internal_rotation.westerfit:is_westerfit_file",
     ),
     Format(
         "output of BELGI",
         (".txt", ".out"),
-        "rotor.formats.belgi:read_belgi",
-        recognises="rotor.formats.belgi:is_belgi_file",
+        "rotor.formats.internal_rotation.belgi:read_belgi",
+        recognises="rotor.formats.internal_rotation.belgi:is_belgi_file",
     ),
     Format("molecule file", (".toml",), "rotor.formats.read_write:read_top_file"),
     Format(
@@ -120,7 +123,7 @@ FORMATS = (
         "JSON",
         (".json",),
         writers={
-            LINES: "rotor.formats.line_tables:write_lines_json",
+            LINES: "rotor.formats.lines.line_tables:write_lines_json",
             TABLE: "rotor.formats.tables:write_json",
             MOTION: "rotor.formats.tables:write_motion",
         },

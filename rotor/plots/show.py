@@ -1,6 +1,6 @@
 """`rotor.plot`: a matplotlib figure of any result of the package, for notebooks, or a picture in a file.
 
-A module of this folder has a function `picture`, which draws the objects of its classes.
+A module of these folders has a function `picture`, which draws the objects of its classes.
 """
 
 from __future__ import annotations
@@ -13,26 +13,27 @@ from typing import Any
 from rotor.plots.picture import Picture, checked_suffix, users_style, wrap_titles
 
 MODULES = {
-    "alignment": ("AlignmentTrace", "AlignAnswer"),
-    "assign": ("AssignAnswer",),
-    "catalogue": ("Catalogue",),
-    "comparison": ("Comparison",),
-    "driven": ("DrivenAnswer",),
-    "emission": ("EmissionAnswer",),
-    "fit": ("Fit", "FitAnswer"),
-    "fluid": ("FluidAnswer",),
-    "gas": ("GasAnswer", "Correlations", "Equipartition"),
-    "heat_capacity": ("ThermoAnswer", "ThermoFunctions"),
-    "levels": ("LevelsAnswer", "SelectedLevels", "Levels"),
-    "polhodes": ("TumbleAnswer", "FreeMotion"),
-    "raman": ("RamanAnswer", "RamanLines"),
-    "spectrum": ("SpectrumAnswer", "Spectrum", "Lines"),
-    "stark": ("StarkAnswer", "FieldMap", "FieldLines"),
+    "motion.alignment": ("AlignmentTrace", "AlignAnswer"),
+    "spectra.assign": ("AssignAnswer",),
+    "spectra.catalogue": ("Catalogue",),
+    "spectra.comparison": ("Comparison",),
+    "motion.driven": ("DrivenAnswer",),
+    "spectra.emission": ("EmissionAnswer",),
+    "spectra.fit": ("Fit", "FitAnswer"),
+    "motion.fluid": ("FluidAnswer",),
+    "motion.gas": ("GasAnswer", "Correlations", "Equipartition"),
+    "energies.heat_capacity": ("ThermoAnswer", "ThermoFunctions"),
+    "energies.levels": ("LevelsAnswer", "SelectedLevels", "Levels"),
+    "motion.polhodes": ("TumbleAnswer", "FreeMotion"),
+    "spectra.raman": ("RamanAnswer", "RamanLines"),
+    "spectra.spectrum": ("SpectrumAnswer", "Spectrum", "Lines"),
+    "energies.stark": ("StarkAnswer", "FieldMap", "FieldLines"),
     "structure": ("StructureAnswer",),
-    "torsion": ("TorsionAnswer",),
-    "zeeman": ("ZeemanAnswer",),
+    "energies.torsion": ("TorsionAnswer",),
+    "energies.zeeman": ("ZeemanAnswer",),
 }  # classes by the module that draws them; a module is imported when it draws
-SINGLE_PANEL = ("catalogue", "emission", "levels", "raman", "spectrum")  # modules that draw on axes of the user
+# modules that draw on axes of the user
+SINGLE_PANEL = ("spectra.catalogue", "spectra.emission", "energies.levels", "spectra.raman", "spectra.spectrum")
 
 
 def plot(

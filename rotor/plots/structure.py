@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.structure_request import StructureAnswer
+from rotor.formats.fits.structure_request import StructureAnswer
 from rotor.molecules.molecule import Molecule
 from rotor.plots.picture import GREY, WIDTH_INCHES, Picture, formula_text, name_text, new_figure, styled
 from rotor.structures.coordinates import bonded

@@ -74,7 +74,7 @@ class SpectrumFile(SubjectKind):
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the peaks and the geometry."""
         from rotor.formats import read
-        from rotor.formats.peak_files import peaks_from_columns, read_peaks
+        from rotor.formats.spectra.peak_files import peaks_from_columns, read_peaks
 
         inputs = read_instance(SpectrumInput, entries)
         if inputs.source is None:
@@ -107,7 +107,7 @@ def answer(request: AssignRequest, work: Work) -> AssignAnswer:
 
 def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:
     """Write the assigned lines of the first species, or of the first linear top, as input of `rotor fit`."""
-    from rotor.formats.assigned_lines import write_assigned_lines
+    from rotor.formats.lines.assigned_lines import write_assigned_lines
 
     lines = [species.lines for species in (answer.species or answer.progressions)]
     if not lines:

@@ -157,7 +157,7 @@ def temperature_of(file: str, option: float | None) -> tuple[float, str]:
 
 def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) -> Catalogue:
     """Lines of a molecule up to the highest J and down to the weakest line of the catalogue, somewhat beyond its range."""
-    from rotor.formats.line_tables import catalogue
+    from rotor.formats.lines.line_tables import catalogue
     from rotor.formats.spcat.compare import in_mhz
     from rotor.spectra.lines import line_list
 

@@ -286,7 +286,7 @@ def _fitted(
 
 def draw(answer: Observed, path: Path, report: Report) -> None:
     """Draw pages of panels with the spectrum and the model."""
-    from rotor.plots.overlay import plot_overlay
+    from rotor.plots.spectra.overlay import plot_overlay
 
     plot_overlay(answer.spectrum, answer.components, path, sight=answer.sight, provenance=report.command)
 
@@ -308,14 +308,14 @@ def draw_diagrams(answer: Observed, path: Path, report: Report) -> None:
 
         write(answer.diagrams, path, settings=dict(report.provenance))
         return
-    from rotor.plots.diagrams import plot_diagrams
+    from rotor.plots.spectra.diagrams import plot_diagrams
 
     plot_diagrams(answer.diagrams, path, report.command)
 
 
 def draw_corner(answer: Observed, path: Path, report: Report) -> None:
     """Draw the sample of every pair of parameters."""
-    from rotor.plots.diagrams import plot_corner
+    from rotor.plots.spectra.diagrams import plot_corner
 
     plot_corner(answer.chain, path, report.command)
 

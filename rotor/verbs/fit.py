@@ -25,7 +25,7 @@ from rotor.verbs.verb import ErrorsShown, Extra, Verb, Work
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
     from rotor.fitting.result import Fit
-    from rotor.formats.fit_request import FitAnswer, FitRequest
+    from rotor.formats.fits.fit_request import FitAnswer, FitRequest
 
 EXAMPLES = """\
   rotor fit case.par --out fitted
@@ -80,8 +80,8 @@ def parameter_records(answer: FitAnswer) -> ColumnTable:
 
 def answer(request: FitRequest, work: Work) -> FitAnswer:
     """The fit and the analyses beside it; iterations are shown on a terminal."""
-    from rotor.formats.assigned_lin import lin_notes
-    from rotor.formats.fit_request import answer_fit
+    from rotor.formats.fits.fit_request import answer_fit
+    from rotor.formats.lines.assigned_lin import lin_notes
 
     further: FitShown = work.shown
     if further.choose is not None and "save_scene" in work.files:
@@ -89,13 +89,13 @@ def answer(request: FitRequest, work: Work) -> FitAnswer:
             "choose: a scene holds no choice of constants; choose first, then save the fit of those constants"
         )
     if further.choose is not None:
-        from rotor.formats.fit_further import chosen_fit
+        from rotor.formats.fits.fit_further import chosen_fit
 
         fit_answer = chosen_fit(request, further.choose, not further.all_orders)
     else:
         fit_answer = answer_fit(request, _show_iteration if work.progress and sys.stderr.isatty() else None)
     if further.try_constants is not None or further.suggest is not None or further.bootstrap:
-        from rotor.formats.fit_further import with_further  # with all that lists of lines need
+        from rotor.formats.fits.fit_further import with_further  # with all that lists of lines need
 
         fit_answer = with_further(fit_answer, further.try_constants, further.suggest, further.bootstrap, further.seed)
     if any(path.suffix.lower() == ".lin" for path in work.files.get("save_lines", ())):
@@ -125,7 +125,7 @@ def withheld(answer: FitAnswer, names: Sequence[str]) -> dict[str, str]:
 
     The best point of an interrupted fit is written.
     """
-    from rotor.formats.fit_request import fitted_par
+    from rotor.formats.fits.fit_request import fitted_par
 
     fit = answer.fit
     if not fit.converged and fit.minimum.status != "interrupted":
@@ -156,28 +156,28 @@ def _text(path: Path, text: str) -> None:
 
 def write_table(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the table for a publication."""
-    from rotor.formats.fit_request import fit_table
+    from rotor.formats.fits.fit_request import fit_table
 
     _text(path, fit_table(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
 
 
 def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the assigned lines, merged."""
-    from rotor.formats.assigned_lines import write_assigned_lines
+    from rotor.formats.lines.assigned_lines import write_assigned_lines
 
     write_assigned_lines(answer.fit.marked_lines, path)
 
 
 def write_report(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the full report."""
-    from rotor.formats.fit_request import fit_report
+    from rotor.formats.fits.fit_request import fit_report
 
     _text(path, fit_report(answer))
 
 
 def write_constants(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the constants in the format of the suffix: a molecule file, or the files of SPFIT and SPCAT."""
-    from rotor.formats.fit_request import write_fitted_par, write_fitted_toml
+    from rotor.formats.fits.fit_request import write_fitted_par, write_fitted_toml
 
     if path.suffix.lower() == ".toml":
         write_fitted_toml(answer, path)
@@ -357,7 +357,7 @@ VERB = Verb(
     content=content,
     notes=lambda answer: (*answer.request.notes, *answer.fit.notes),
     drawn=None,
-    numerics="rotor.formats.fit_numerics:FIT",
+    numerics="rotor.formats.fits.fit_numerics:FIT",
     accuracy="of the frequencies of the lines, or of the constants (% of their standard errors)",
     sound=False,
     build=build,

@@ -132,7 +132,7 @@ def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[
 
 def draw(answer: Identified, path: Path, report: Report) -> None:
     """Draw pages of panels with the fitted model."""
-    from rotor.plots.overlay import plot_overlay
+    from rotor.plots.spectra.overlay import plot_overlay
 
     components = [evidence.component for evidence in answer.identification.species]
     marked = [line.frequency_mhz for line in answer.identification.unidentified]

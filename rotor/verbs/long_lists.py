@@ -18,7 +18,7 @@ from rotor.spectra.transitions import TooManyLinesError, spin_functions, transit
 from rotor.thermodynamics.sums.partition import PartitionFunction
 
 if TYPE_CHECKING:
-    from rotor.formats.streamed_lines import SortedLines
+    from rotor.formats.lines.streamed_lines import SortedLines
 
 # longest lists made in memory by what is written, in less than 1 GB: 0.08, 0.23 and 0.20 kB a line; longer ones are made on disk
 LINES_IN_MEMORY = {"cat": 10_000_000, "csv": 4_000_000, "parquet": 4_000_000}
@@ -172,7 +172,7 @@ def _bar(what: str, shown: bool) -> AbstractContextManager[Callable[[int, int], 
 
 
 def _sorted(request: SpectrumRequest, folder: Path, progress: Callable[[int, int], object] | None) -> SortedLines:
-    from rotor.formats.streamed_lines import sorted_lines
+    from rotor.formats.lines.streamed_lines import sorted_lines
 
     return sorted_lines(
         request.top,

@@ -19,7 +19,7 @@ from rotor.verbs.subjects import MOLECULE, file_name, saved_inputs, saved_molecu
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
-    from rotor.formats.fit_request import FitRequest
+    from rotor.formats.fits.fit_request import FitRequest
     from rotor.verbs.verb import Verb
 
 
@@ -230,7 +230,7 @@ def _start(entries: Entries, source: Path | None) -> MoleculeInput:
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> FitRequest:
     """The request of the fit."""
-    from rotor.formats.fit_request import lines_request, spfit_request, with_more_lines
+    from rotor.formats.fits.fit_request import lines_request, spfit_request, with_more_lines
 
     inputs, paths = subject.values["inputs"], subject.values["paths"]
     if subject.top is None:

@@ -21,7 +21,7 @@ class Comparison:
 
     def __init__(self, lines: Lines, path: str) -> None:
         from rotor.assignment.intensities import fit_intensities
-        from rotor.formats.peak_files import read_peaks
+        from rotor.formats.spectra.peak_files import read_peaks
 
         self.peaks: PeakList = read_peaks(path)
         low, high = self.peaks.band_mhz
@@ -89,10 +89,10 @@ def compared(answer: Any, report: Report) -> Comparison:
 
 
 def drawing(name: str) -> Callable[[Any, Path, Report], None]:
-    """Function that draws a picture of `rotor.plots.over`."""
+    """Function that draws a picture of `rotor.plots.spectra.over`."""
 
     def draw(answer: Any, path: Path, report: Report) -> None:
-        from rotor.plots import over
+        from rotor.plots.spectra import over
         from rotor.plots.view import View
 
         comparison = compared(answer, report)

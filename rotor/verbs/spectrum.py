@@ -129,7 +129,7 @@ def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumS
     if "egy" in outputs and not isinstance(request, int_files.PredictedRequest):
         raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
     if shown.over is not None:
-        from rotor.formats.peak_files import read_peaks
+        from rotor.formats.spectra.peak_files import read_peaks
 
         read_peaks(shown.over)  # raises errors in the file before anything is computed
     if "profile_csv" in outputs and not (_is_shaped(request) or request.layer):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
-from rotor.formats.structure_request import StructureAnswer, StructureRequest, answer_structure
+from rotor.formats.fits.structure_request import StructureAnswer, StructureRequest, answer_structure
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
@@ -53,7 +53,7 @@ class Isotopologues(SubjectKind):
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the family."""
-        from rotor.formats.family_file import FamilyFile, read_family
+        from rotor.formats.fits.family_file import FamilyFile, read_family
         from rotor.structures.family import Family
 
         inputs: FamilyInput = read_instance(FamilyInput, entries)
@@ -202,7 +202,7 @@ VERB = Verb(
     ),
     subject=Isotopologues(),
     shown=ErrorsShown,
-    numerics="rotor.formats.structure_request:STRUCTURE",
+    numerics="rotor.formats.fits.structure_request:STRUCTURE",
     accuracy="of the bond lengths",
     accuracy_example="0.001 Å",
     notes=lambda answer: answer.notes,

@@ -53,7 +53,7 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
     """Refuse a film without two times or without its program."""
     if "gif" not in outputs:
         return
-    from rotor.plots.animation import check_film
+    from rotor.plots.motion.animation import check_film
 
     path, times = str(outputs["gif"][0]), request.times
     with within("{outputs.gif}"):
@@ -67,7 +67,7 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
 def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
     """Write the animation."""
     from rotor.classical.tumble import TumbleAnswer
-    from rotor.plots.animation import animate
+    from rotor.plots.motion.animation import animate
 
     assert isinstance(answer, TumbleAnswer)
     request, units = answer.request, answer.request.units
@@ -82,7 +82,7 @@ def _atoms(request: TumbleRequest) -> Any:
     top = getattr(request, "top", None)
     if top is None or top.molecule is None or top.frame is None:
         return None
-    from rotor.plots.animation import Atoms
+    from rotor.plots.motion.animation import Atoms
 
     return Atoms((top.molecule.positions_angstrom - top.frame.centre) @ top.frame.axes.T, top.molecule.symbols)
 

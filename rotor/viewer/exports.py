@@ -13,7 +13,7 @@ from rotor.viewer.prediction import Model
 from rotor.viewer.records import Line
 
 if TYPE_CHECKING:
-    from rotor.formats.fit_request import FitAnswer
+    from rotor.formats.fits.fit_request import FitAnswer
 
 
 def exported(what: str, model: Model, lines: Mapping[int, Line]) -> tuple[str, str]:
@@ -28,7 +28,7 @@ def exported(what: str, model: Model, lines: Mapping[int, Line]) -> tuple[str, s
 
 def _lines_as(suffix: str) -> Callable[[Model, Mapping[int, Line], str], str]:
     def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
-        from rotor.formats.assigned_lines import write_assigned_lines
+        from rotor.formats.lines.assigned_lines import write_assigned_lines
 
         return _written(f"{stem}.{suffix}", lambda path: write_assigned_lines(fit_assignments(model, lines), path))
 
@@ -39,7 +39,7 @@ def fit_answer(model: Model, lines: Mapping[int, Line], stem: str) -> FitAnswer:
     """The fit with its request, as the writers of fits take it."""
     from rotor.fitting.fit import FitOptions
     from rotor.fitting.parameters import parameters, with_names
-    from rotor.formats.fit_request import FitAnswer, FitFiles, FitRequest
+    from rotor.formats.fits.fit_request import FitAnswer, FitFiles, FitRequest
 
     fit, free = fit_species(model, lines), list(model.record.free)
     begin = with_names(model.constants, free)
@@ -50,7 +50,7 @@ def fit_answer(model: Model, lines: Mapping[int, Line], stem: str) -> FitAnswer:
 
 def _par(variances: bool) -> Callable[[Model, Mapping[int, Line], str], str]:
     def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
-        from rotor.formats.fit_request import write_fitted_par
+        from rotor.formats.fits.fit_request import write_fitted_par
 
         answer = fit_answer(model, lines, stem)
         return _written(f"{stem}.par", lambda path: write_fitted_par(answer, path, variances=variances))
@@ -61,7 +61,7 @@ def _par(variances: bool) -> Callable[[Model, Mapping[int, Line], str], str]:
 def _toml(model: Model, lines: Mapping[int, Line], stem: str) -> str:
     """The molecule file; after a fit, with errors and correlations."""
     from rotor.fitting.top_constants import TopConstants
-    from rotor.formats.fit_request import write_fitted_toml
+    from rotor.formats.fits.fit_request import write_fitted_toml
     from rotor.formats.molecules.molecule_file import MoleculeFile
     from rotor.formats.molecules.molecule_writer import write_molecule_file
 
@@ -99,7 +99,7 @@ def _scene(model: Model, lines: Mapping[int, Line], stem: str) -> str:
 
 def _table(form: str) -> Callable[[Model, Mapping[int, Line], str], str]:
     def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
-        from rotor.formats.fit_request import fit_table
+        from rotor.formats.fits.fit_request import fit_table
 
         return fit_table(fit_answer(model, lines, stem), form)
 
@@ -107,7 +107,7 @@ def _table(form: str) -> Callable[[Model, Mapping[int, Line], str], str]:
 
 
 def _report(model: Model, lines: Mapping[int, Line], stem: str) -> str:
-    from rotor.formats.fit_request import fit_report
+    from rotor.formats.fits.fit_request import fit_report
 
     return fit_report(fit_answer(model, lines, stem))
 

@@ -189,7 +189,7 @@ def edit(state: State, message: Message, context: Context) -> Change:
 
 def import_lines(state: State, number: int, path: str, context: Context) -> Change:
     """Add the assigned lines of a file to a species; lines that the session has already are left out."""
-    from rotor.formats.assigned_lines import names_sums, read_assigned_lines
+    from rotor.formats.lines.assigned_lines import names_sums, read_assigned_lines
 
     record = state.species[number]
     model = context.predictions.model(record)

@@ -49,7 +49,7 @@ def read_peak_list(path: Path, spectrum: ObservedSpectrum) -> PeakList | None:
     alike = np.abs(np.diff(steps)) <= ALIKE * steps[1:]
     if len(steps) < 2 or alike.mean() > 0.5 or first_bytes(path, 9) == b"SIMPLE  =":
         return None
-    from rotor.formats.peak_files import read_peaks
+    from rotor.formats.spectra.peak_files import read_peaks
 
     return read_peaks(path)
 

@@ -22,7 +22,7 @@ from rotor.arrays import Floats, Ints
 from rotor.fitting.parameters import with_names
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.fitting.top_levels import label_model
-from rotor.formats.assigned_lines import QUANTA
+from rotor.formats.lines.assigned_lines import QUANTA
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.labelled import MissingLevelsError
 from rotor.quantum.quanta import SPECIES_NUMBERS

@@ -22,7 +22,7 @@ from rotor.assignment.growth import prior_weight
 from rotor.assignment.peaks import PeakList, peak_list, spurs
 from rotor.assignment.request import AssignRequest
 from rotor.assignment.rigid_table import PARAMETERS
-from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 
 REFERENCE = SHARED / "reference" / "broadband"
 

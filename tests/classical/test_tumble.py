@@ -18,7 +18,7 @@ from rotor.classical.free.free_motion import free_motion
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum
 from rotor.classical.tumble import TumbleRequest
 from rotor.geometry.rotations import distance
-from rotor.plots import animation
+from rotor.plots.motion import animation
 from rotor.units import ASE_TIME_PS, CM_PER_EV, EV_PER_K, HBAR_CLASSICAL
 
 COLUMNS = ["t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy"]

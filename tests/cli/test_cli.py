@@ -304,7 +304,7 @@ def test_every_file_is_written_with_its_provenance(call, folder):
 
 
 def test_files_appear_all_or_none(call, folder, monkeypatch):
-    from rotor.plots import spectrum as plots
+    from rotor.plots.spectra import spectrum as plots
 
     (folder / "a.csv").write_text("old", encoding="utf-8")
 

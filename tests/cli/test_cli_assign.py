@@ -14,7 +14,7 @@ import rotor
 from rotor.assignment.assign import answer_assign
 from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.request import AssignRequest
-from rotor.formats.peak_files import peaks_from_columns, read_peaks
+from rotor.formats.spectra.peak_files import peaks_from_columns, read_peaks
 
 Call = Callable[..., tuple[int, str, str]]
 

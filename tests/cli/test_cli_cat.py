@@ -214,7 +214,7 @@ def test_another_isotope_is_compared(call, tmp_path):
 
 def test_a_comparison_is_drawn_as_a_mirror_with_differences():
     from rotor.formats.spcat.compare import compare
-    from rotor.plots.comparison import comparison_figure
+    from rotor.plots.spectra.comparison import comparison_figure
 
     whole = read_cat(OCS)
     comparison = compare(whole, read_cat(OCS).take(slice(5, None)))

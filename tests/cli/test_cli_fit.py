@@ -13,7 +13,7 @@ from documented_options import undocumented
 from places import ORACLES, PROJECT
 
 import rotor
-from rotor.formats.family_file import read_family
+from rotor.formats.fits.family_file import read_family
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.spcat.text.par import read_par
 from rotor.spectra.lines import line_list

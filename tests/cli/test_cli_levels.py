@@ -16,7 +16,7 @@ from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.level_list import level_list
 from rotor.formats.spcat.text.par import read_par
-from rotor.plots.levels import ladders, levels_figure
+from rotor.plots.energies.levels import ladders, levels_figure
 from rotor.plots.show import write_picture
 from rotor.plots.view import View
 from rotor.quantum.effects.of_top import effects_of

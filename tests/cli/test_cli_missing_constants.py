@@ -15,7 +15,7 @@ import rotor
 from rotor.fitting.budgets import predictions_budget
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
-from rotor.formats.assigned_lines import read_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 

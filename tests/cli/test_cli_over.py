@@ -14,7 +14,7 @@ import rotor
 from rotor.assignment.intensities import fit_intensities, line_types, matched
 from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.peaks import peak_list
-from rotor.plots.over import loomis_wood_figure, over_figure
+from rotor.plots.spectra.over import loomis_wood_figure, over_figure
 from rotor.spectra.lines import Lines
 
 Call = Callable[..., tuple[int, str, str]]
@@ -115,7 +115,7 @@ def test_command_with_pictures(call: Call, folder: Path) -> None:
 
 
 def test_strongest_lines_are_named_above_their_peaks() -> None:
-    from rotor.plots.over import over_figure
+    from rotor.plots.spectra.over import over_figure
     from rotor.plots.view import View
     from rotor.quantum.quanta import line_text
 

@@ -10,7 +10,7 @@ import pytest
 from places import ORACLES
 
 import rotor
-from rotor.formats.hitran import HitranLines, format_hitran, read_hitran
+from rotor.formats.lines.hitran import HitranLines, format_hitran, read_hitran
 from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, format_lin, read_lin, with_defaults

@@ -201,7 +201,7 @@ def test_a_full_standard_output_is_exit_1():
 WAITS = """
 import sys, time
 from pathlib import Path
-import rotor.formats.line_tables as tables
+import rotor.formats.lines.line_tables as tables
 def slow(path):
     Path(path).write_text("half")
     print("writing", flush=True)

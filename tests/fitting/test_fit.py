@@ -14,7 +14,7 @@ from rotor.fitting.publication import publication_table, value_text
 from rotor.fitting.report import decisive, report_text
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.search import robust
-from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.quantum.estimates.uncertainty import level_errors

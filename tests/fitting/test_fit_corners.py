@@ -23,8 +23,8 @@ from rotor.fitting.resampling import bootstrap
 from rotor.fitting.result import Fit, determined_covariance
 from rotor.fitting.top_constants import TopConstants
 from rotor.fitting.top_levels import top_levels
-from rotor.formats.assigned_lines import write_assigned_lines
-from rotor.formats.fit_request import answer_fit, lines_request, write_fitted_toml
+from rotor.formats.fits.fit_request import answer_fit, lines_request, write_fitted_toml
+from rotor.formats.lines.assigned_lines import write_assigned_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.hamiltonian.codes import FIXED

@@ -15,9 +15,9 @@ import rotor
 from rotor.cli import run
 from rotor.fitting.publication import name_text
 from rotor.fitting.report import dfbetas, influence, report_text, statistics_text
-from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
-from rotor.formats.fit_request import answer_fit, lines_request
-from rotor.plots.fit import fit_figure
+from rotor.formats.fits.fit_request import answer_fit, lines_request
+from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
+from rotor.plots.spectra.fit import fit_figure
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

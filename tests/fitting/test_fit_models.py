@@ -19,9 +19,9 @@ from rotor.fitting.report import report_text
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
-from rotor.formats.assigned_lin import as_lin, lin_notes
-from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
-from rotor.plots.fit import fit_figure
+from rotor.formats.lines.assigned_lin import as_lin, lin_notes
+from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
+from rotor.plots.spectra.fit import fit_figure
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

@@ -21,8 +21,8 @@ from rotor.fitting.orders import j_order
 from rotor.fitting.parameters import parameters, with_names
 from rotor.fitting.top_constants import TopConstants
 from rotor.fitting.top_levels import top_levels
-from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
-from rotor.formats.fit_request import answer_fit, lines_request
+from rotor.formats.fits.fit_request import answer_fit, lines_request
+from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.fits.fit_input import spfit_input
 from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
 from rotor.formats.spcat.fits.named_fit import named_file
@@ -184,7 +184,7 @@ def test_the_same_fit_as_from_spfits_files(case):
 
 def test_the_file_of_a_fit_gives_its_lines_their_errors(case):
     answer = answer_fit(lines_request("lines.csv", rotor.read("start.toml"), names(FREE), start="start.toml"))
-    rotor.formats.fit_request.write_fitted_toml(answer, "fitted.toml")
+    rotor.formats.fits.fit_request.write_fitted_toml(answer, "fitted.toml")
     content = tomllib.loads((case / "fitted.toml").read_text())
     assert content["covariance"]["names"] == names(FREE)
     assert set(content["states"]["G_c[0,1]"]) == set(content["spins"]["14N"]["chi_aa"]) == {"value", "uncertainty"}

@@ -16,8 +16,8 @@ from rotor.fitting.parameters import parameters
 from rotor.fitting.report import dfbetas, influential
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.result import Fit
-from rotor.formats import fit_further
-from rotor.formats.fit_request import answer_fit, lines_request
+from rotor.formats.fits import fit_further
+from rotor.formats.fits.fit_request import answer_fit, lines_request
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import read_par
@@ -239,7 +239,7 @@ a    1    1    0   20    0    1    1    1    0    -1   1
 
 
 def test_the_table_of_several_states_has_every_parameter_with_its_state(seen, tmp_path):
-    from rotor.formats.fit_request import answer_fit, fit_report, fit_table, spfit_request
+    from rotor.formats.fits.fit_request import answer_fit, fit_report, fit_table, spfit_request
 
     (tmp_path / "two.par").write_text(TWO_STATES)
     rows = []

@@ -12,7 +12,7 @@ from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
 from rotor.fitting.top_levels import label_model
-from rotor.formats.assigned_lines import write_assigned_lines
+from rotor.formats.lines.assigned_lines import write_assigned_lines
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.spins.spin_constants import SpinConstants
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.belgi import read_belgi_levels
+from rotor.formats.internal_rotation.belgi import read_belgi_levels
 
 CM = rotor.units.MHZ_PER_CM
 # constants and levels of wes648/Westerfit.jl @cd9d2e6, test/belgi (V3 = 200 cm-1), its layout

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from oracle_cases import SAMPLES, prediction
 
-from rotor.formats.line_tables import catalogue
+from rotor.formats.lines.line_tables import catalogue
 from rotor.formats.spcat.compare import agreement, compare, in_mhz, likely_temperature_k, with_measured_lines
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.catalogue import Layout

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from places import PROJECT
 
-from rotor.formats.assigned_lines import read_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines
 
 SCRIPT = PROJECT / "docs" / "make_fitted_catalogues.py"
 

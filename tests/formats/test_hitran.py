@@ -11,7 +11,7 @@ from changed_files import mutated
 from places import ORACLES
 
 import rotor
-from rotor.formats.hitran import (
+from rotor.formats.lines.hitran import (
     HitranLines,
     cm_per_molecule,
     format_hitran,

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats import line_tables
+from rotor.formats.lines import line_tables
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import parse_scene
 from rotor.verbs import long_lists
@@ -138,7 +138,7 @@ SPINS = {  # constants, spins, dipole, J max, cut
 @pytest.mark.parametrize("name", SPINS)
 def test_a_long_list_with_spins_is_the_one_in_memory(call, folder, monkeypatch, short, name):
     """Pieces of few F, whose levels mix N: every line once, the catalogue of a list in memory. Ended in an error of the sort before."""
-    from rotor.formats import streamed_lines
+    from rotor.formats.lines import streamed_lines
 
     constants, spins, dipole, jmax, cut = SPINS[name]
     typed = ("spectrum", "--constants", constants, "--spin-constants", spins, "--dipole-abc", dipole, "--jmax", str(jmax),
@@ -221,7 +221,7 @@ def test_short_lists_are_made_in_memory(call, folder, monkeypatch):
 
 
 def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
-    from rotor.formats import streamed_lines
+    from rotor.formats.lines import streamed_lines
 
     monkeypatch.setattr(streamed_lines, "PIECE_LINES", 2_000)
     pieces, true = [], streamed_lines.make_piece
@@ -252,7 +252,7 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
 
 def test_a_piece_of_many_lines_is_written_in_parts(call, folder, monkeypatch, short):
     """One F of J = 300 has 3.6 million lines with one 14N, whose columns took 0.55 GB at once."""
-    from rotor.formats import list_pieces
+    from rotor.formats.lines import list_pieces
 
     with monkeypatch.context() as patch:
         patch.setattr(list_pieces, "BATCH", 300)
@@ -282,7 +282,7 @@ def test_a_list_is_sorted_in_ranges_of_frequency(call, folder, monkeypatch, shor
     """DuckDB's sort of 367 million lines at once ended in an OutOfMemoryException."""
     import duckdb
 
-    from rotor.formats import sorted_pieces
+    from rotor.formats.lines import sorted_pieces
 
     with monkeypatch.context() as patch:
         patch.setattr(sorted_pieces, "SORTED_LINES", 1000)
@@ -304,7 +304,7 @@ def test_a_list_is_sorted_in_ranges_of_frequency(call, folder, monkeypatch, shor
 
 def test_a_list_that_is_sorted_is_not_made_again(call, folder, monkeypatch, short):
     """Interrupted while a file is written: no piece is solved again, and the pieces take no space on the disk beside the sorted list."""
-    from rotor.formats import streamed_lines
+    from rotor.formats.lines import streamed_lines
 
     def stop(*_):
         raise KeyboardInterrupt
@@ -322,7 +322,7 @@ def test_a_list_that_is_sorted_is_not_made_again(call, folder, monkeypatch, shor
 
 def test_the_lines_that_are_written_are_counted(folder, monkeypatch, short):
     """The catalogue of 367 million lines is written for half an hour."""
-    from rotor.formats.streamed_lines import sorted_lines
+    from rotor.formats.lines.streamed_lines import sorted_lines
     from rotor.tops.top import Top
 
     top = Top.from_constants(CONSTANTS, dipole_abc_debye=(1.2, 1.9, 0.4))

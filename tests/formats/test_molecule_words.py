@@ -134,7 +134,7 @@ def test_lines_in_every_format(tmp_path, suffix):
 
 
 def test_long_lists_are_written_in_the_same_bytes_as_short_ones(tmp_path, monkeypatch):
-    from rotor.formats import line_tables
+    from rotor.formats.lines import line_tables
 
     top = rotor.Top.from_constants("A=9 B=5 C=3 GHz", dipole_abc_debye=(1, 1, 1))
     lines = rotor.api.line_list(top, jmax=14)

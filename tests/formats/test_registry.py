@@ -19,7 +19,7 @@ import pytest
 
 import rotor
 from rotor.formats import packed, tables
-from rotor.formats.line_tables import as_printed
+from rotor.formats.lines.line_tables import as_printed
 from rotor.formats.provenance import provenance_record
 from rotor.formats.registry import FORMATS, loaded, suffixes_for
 from rotor.formats.spcat.file_quanta import Format

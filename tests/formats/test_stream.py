@@ -17,8 +17,8 @@ import pytest
 from places import PROJECT
 
 import rotor
+from rotor.formats.lines.streamed_lines import stream_lines
 from rotor.formats.spcat.text.cat import read_cat
-from rotor.formats.streamed_lines import stream_lines
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

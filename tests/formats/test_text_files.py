@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotor.formats.assigned_lines import read_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.toml import read_toml
 from rotor.molecules.readers.xyz import decode

@@ -9,8 +9,8 @@ from places import SHARED
 import rotor
 from rotor.fitting.assignment import levels_in
 from rotor.fitting.top_levels import label_model
-from rotor.formats.assigned_lines import read_assigned_lines
-from rotor.formats.fit_request import constants_for
+from rotor.formats.fits.fit_request import constants_for
+from rotor.formats.lines.assigned_lines import read_assigned_lines
 
 # constants of wes648/Westerfit.jl @a3ad4f0, examples/mcltol/bothfinal/mcltol.inp, its layout
 INPUT = """mcltol   @   2023-10-30T18:11:06.405

@@ -201,7 +201,7 @@ def test_lines_that_no_dipole_makes_are_named_and_others_are_not():
 
 @pytest.mark.parametrize(("unit", "factor"), [("mhz", 1.0), ("khz", 1e-3)])
 def test_widths_of_blends_are_read_in_their_unit(folder, unit, factor):
-    from rotor.formats.assigned_lines import read_assigned_lines
+    from rotor.formats.lines.assigned_lines import read_assigned_lines
 
     rows = "1,0,12000,0.01,7,20\n2,1,24000,0.01,7,20\n"
     Path("lines.csv").write_text(f"j_upper,j_lower,frequency_mhz,error_mhz,blend,width_{unit}\n{rows}")

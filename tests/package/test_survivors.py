@@ -14,8 +14,8 @@ from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.classical.lyapunov import Flow, lyapunov_exponents
 from rotor.fitting.publication import suitable_unit, value_text
 from rotor.formats.spcat.hamiltonian.labels import Functions, _by_k2
-from rotor.plots.raman import picture as raman_picture
 from rotor.plots.show import write_picture
+from rotor.plots.spectra.raman import picture as raman_picture
 from rotor.plots.view import View
 from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.wang_matrix import lowest_energies

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.plots import spectrum as plots
 from rotor.plots.picture import formula_text
 from rotor.plots.show import write_picture
+from rotor.plots.spectra import spectrum as plots
 from rotor.spectra.spectrum import Spectrum, resolving_grid
 
 START = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}

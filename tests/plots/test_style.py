@@ -11,7 +11,7 @@ from places import PROJECT
 import rotor
 from rotor.observed.model import Sight
 from rotor.observed.spectrum import ObservedSpectrum
-from rotor.plots.overlay import overlay_figure
+from rotor.plots.spectra.overlay import overlay_figure
 from rotor.plots.work_precision import Panel, Point, work_precision_figure
 
 COLUMN = "figure.figsize: 3.35, 2.4\nfigure.dpi: 100\nfont.size: 7\n"

@@ -101,7 +101,7 @@ def test_a_decade_coarser_misses(folder):
     """Of brightness by its least depth, and of a fit by its tolerance: the stated error of the next setting is above the accuracy."""
     from dataclasses import replace
 
-    from rotor.formats.fit_request import answer_fit
+    from rotor.formats.fits.fit_request import answer_fit
     from rotor.spectra.emission_request import answer_emission
 
     def taken(kind, accuracy, body):

@@ -9,7 +9,7 @@ import pytest
 import scipy.constants as si
 
 import rotor
-from rotor.formats.hitran import cm_per_molecule, read_hitran
+from rotor.formats.lines.hitran import cm_per_molecule, read_hitran
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ, LGINT_NM2_MHZ
 from rotor.spectra.lines import line_list
 from rotor.spectra.opacity import column_density_per_cm2, line_optical_depth, optical_depth

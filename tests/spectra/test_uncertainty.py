@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.line_tables import catalogue
+from rotor.formats.lines.line_tables import catalogue
 from rotor.formats.spcat.hamiltonian.codes import file_constants
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.par import read_par

@@ -508,7 +508,7 @@ def test_the_isotopologue_that_is_unlike_the_others_is_found():
 
 def test_measured_families_have_no_false_alarm():
     """Of maleic anhydride the published constants: its planar moments change by 0.0024 along c and by 0.017 along a."""
-    from rotor.formats.family_file import read_family
+    from rotor.formats.fits.family_file import read_family
 
     file = read_family(PROJECT / "examples" / "maleic_anhydride.toml")
     assert len(moments_across_planes(file.family)) >= 9

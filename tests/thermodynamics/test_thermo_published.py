@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from places import ORACLES, PROJECT
 
-from rotor.plots.heat_capacity import heat_capacity_figure, picture
+from rotor.plots.energies.heat_capacity import heat_capacity_figure, picture
 from rotor.thermodynamics.functions import GAS_CONSTANT, thermodynamic_functions
 
 KNOWN = tomllib.loads((ORACLES / "heat_capacity.toml").read_text(encoding="utf-8"))

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import rotor
 from rotor.classical.tumble import TumbleRequest
 from rotor.plots.show import MODULES
-from rotor.plots.spectrum import spectrum_figure
+from rotor.plots.spectra.spectrum import spectrum_figure
 from rotor.spectra.emission import Source
 from rotor.spectra.emission_request import EmissionRequest
 from rotor.spectra.spectrum import resolving_grid

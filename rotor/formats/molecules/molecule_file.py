@@ -101,8 +101,8 @@ from dataclasses import field
 from pathlib import Path
 
 from rotor.checks import read_text
-from rotor.formats.magnetic_table import read_magnetic
 from rotor.formats.molecules.internal_rotation_table import read_internal_rotation
+from rotor.formats.molecules.magnetic_table import read_magnetic
 from rotor.formats.molecules.molecule_tables import (
     MeasuredLines,
     Served,

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
-from rotor.formats.magnetic_table import magnetic_table
 from rotor.formats.molecules.internal_rotation_table import internal_rotation_table
 from rotor.formats.molecules.level_table import write_level_table
+from rotor.formats.molecules.magnetic_table import magnetic_table
 from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.molecules.spin_table import spin_tables, uncertain_entry
 from rotor.formats.toml import toml_key, toml_value

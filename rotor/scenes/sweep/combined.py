@@ -101,7 +101,7 @@ class CombinedFile:
     def join(self, keys: Sequence[str], provenance: str) -> None:
         """Write the files with the rows of these points, in this order, and remove the folder."""
         from rotor.formats.atomic_write import atomic_path
-        from rotor.formats.sorted_pieces import engine_in, listed
+        from rotor.formats.lines.sorted_pieces import engine_in, listed
         from rotor.formats.tables import quoted, run
 
         order = {key[:KEY_LENGTH]: number for number, key in enumerate(keys)}  # columns of the first point come first

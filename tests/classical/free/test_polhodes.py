@@ -19,10 +19,10 @@ from rotor.classical.integrators.method import integrate
 from rotor.classical.integrators.splitting import RotationSplitting
 from rotor.classical.motion import MotionTable, invariant_drift, sampled
 from rotor.geometry.rotations import IDENTITY, distance
-from rotor.plots.animation import Atoms, animate, box_edges, frame_times
-from rotor.plots.polhodes import polhode_figure
+from rotor.plots.motion.animation import Atoms, animate, box_edges, frame_times
+from rotor.plots.motion.polhodes import polhode_figure
+from rotor.plots.motion.sphere import clear_view
 from rotor.plots.show import write_picture
-from rotor.plots.sphere import clear_view
 
 moments_of_a_body = st.permutations((0, 1, 2)).flatmap(
     lambda order: st.tuples(*(st.floats(0.5, 2.0) for _ in range(3))).map(lambda m: np.array(m)[list(order)])

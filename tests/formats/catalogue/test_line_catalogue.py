@@ -13,7 +13,7 @@ from rotor.formats.catalogue.cat_species import read_cat_species
 from rotor.formats.catalogue.catdir import read_catdir
 from rotor.formats.catalogue.database import LineCatalogue
 from rotor.formats.catalogue.names import hill_formula
-from rotor.formats.hitran import hitran_lines, write_hitran
+from rotor.formats.lines.hitran import hitran_lines, write_hitran
 from rotor.observed.partition import PartitionTable
 from rotor.observed.species import species_from_lines
 from rotor.spectra.lines import line_list

@@ -9,7 +9,7 @@ import pytest
 from places import ORACLES
 
 import rotor
-from rotor.formats.assigned_lines import read_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.molecules.molecule_writer import write_molecule_file
 from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation

@@ -10,7 +10,7 @@ import pytest
 
 import rotor
 from rotor.cli import run
-from rotor.formats.assigned_lines import read_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines
 from rotor.formats.spcat.fits.fit_input import spfit_input
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.cat import read_cat

@@ -8,7 +8,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
+from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 
 HERE = Path(__file__).parent
 CATALOGUES = {"ocs": "c060503", "o13cs": "c061502", "oc34s": "c062505", "18ocs": "c062506"}

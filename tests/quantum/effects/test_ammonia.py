@@ -15,7 +15,7 @@ from places import PROJECT
 
 import rotor
 from rotor import units
-from rotor.formats.line_tables import catalogue
+from rotor.formats.lines.line_tables import catalogue
 from rotor.formats.molecules.level_table import read_level_table, write_level_table
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels

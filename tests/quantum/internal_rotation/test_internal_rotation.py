@@ -9,7 +9,7 @@ from linear_functions import energies_of
 from places import ORACLES
 
 import rotor
-from rotor.formats.belgi import read_belgi_levels
+from rotor.formats.internal_rotation.belgi import read_belgi_levels
 from rotor.quantum.internal_rotation.labels import counted_ka_kc
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.torsion import TorsionalPotential, torsional_states

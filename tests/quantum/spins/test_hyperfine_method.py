@@ -152,7 +152,7 @@ def test_the_command_line_says_which_method_was_used(capsys):
 
 
 def test_a_picture_names_the_components_inside_its_axes():
-    from rotor.plots.spectrum import spectrum_figure
+    from rotor.plots.spectra.spectrum import spectrum_figure
 
     top = rotor.read("HCONH2")
     lines = line_list(top, jmax=2, temperature_k=300.0, effects=effects_of(top, True))

@@ -19,8 +19,8 @@ from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import Parameters
 from rotor.fitting.result import Fit
-from rotor.formats.assigned_lin import with_excluded_lines
-from rotor.formats.assigned_lines import QUANTA
+from rotor.formats.lines.assigned_lin import with_excluded_lines
+from rotor.formats.lines.assigned_lines import QUANTA
 from rotor.formats.spcat.hamiltonian.codes import FIXED, FREE_ABOVE, NO_LEADER, constants_and_matrix, is_held
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remark_notes, with_defaults

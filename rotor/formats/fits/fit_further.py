@@ -13,7 +13,7 @@ from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import with_names
 from rotor.fitting.result import Fit
 from rotor.fitting.unmeasured import unmeasured
-from rotor.formats.fit_request import FitAnswer, FitRequest, answer_fit
+from rotor.formats.fits.fit_request import FitAnswer, FitRequest, answer_fit
 
 MOST_SUGGESTIONS = 20
 

@@ -24,7 +24,7 @@ from rotor.fitting.publication import publication_table
 from rotor.fitting.report import fit_facts, report_text
 from rotor.fitting.result import Fit, determined_covariance
 from rotor.fitting.top_constants import DIPOLES, ConstantSet, TopConstants
-from rotor.formats.assigned_lines import QUANTA, names_field, names_sums, read_assigned_lines
+from rotor.formats.lines.assigned_lines import QUANTA, names_field, names_sums, read_assigned_lines
 from rotor.quantum.labelled import LevelModel
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.fill import within
@@ -107,7 +107,7 @@ class FittedParameters(Table):
 class FitAnswer:
     """The result of a request for a fit.
 
-    steps: of a choice of constants. trials, suggestions, spread: what was tried beside the fit, see `rotor.formats.fit_further`;
+    steps: of a choice of constants. trials, suggestions, spread: what was tried beside the fit, see `rotor.formats.fits.fit_further`;
     interrupted: what of these is not complete.
     """
 

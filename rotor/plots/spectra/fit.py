@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotor.fitting.result import Fit
-from rotor.formats.fit_request import FitAnswer
+from rotor.formats.fits.fit_request import FitAnswer
 from rotor.plots.picture import BLUE, GREY, ORANGE, WIDTH_INCHES, Picture, new_figure, styled
 from rotor.table import counted
 

@@ -15,7 +15,7 @@ from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut
 
 if TYPE_CHECKING:
-    from rotor.formats.fit_request import FitRequest
+    from rotor.formats.fits.fit_request import FitRequest
     from rotor.tops.top import Top
 
 ITERATIONS = (1, 2, 3, 4, 6, 10)

@@ -23,7 +23,7 @@ from rotor.plots.picture import (
     top_title,
     without_signs,
 )  # fmt: skip
-from rotor.plots.spectrum import thinned
+from rotor.plots.spectra.spectrum import thinned
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import line_text
 from rotor.spectra.lines import Lines

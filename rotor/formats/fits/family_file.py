@@ -151,7 +151,7 @@ def _constants(
 def _fitted(path: Path, start: Constants, options: FitOptions | None) -> Fit:
     from rotor.fitting.fit import fit_lines
     from rotor.fitting.parameters import parameters
-    from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+    from rotor.formats.lines.assigned_lines import QUANTA, read_assigned_lines
 
     lines, _ = read_assigned_lines(path, QUANTA[start.kind])
     return fit_lines(lines, start, parameters(start, list(start.values)), options)

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import GREY, PALETTE, Picture, legend_below, panel, styled, top_title
-from rotor.plots.spectrum import UNITS, thinned
+from rotor.plots.spectra.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text
 from rotor.spectra.emission_request import EmissionAnswer

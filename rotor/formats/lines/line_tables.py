@@ -25,7 +25,7 @@ from rotor.formats.spcat.text.fields import BLANK
 from rotor.spectra.lines import Lines
 
 if TYPE_CHECKING:
-    from rotor.formats.hitran import HitranLines
+    from rotor.formats.lines.hitran import HitranLines
 
 MAX_QUANTA = 9  # the last digit of QNFMT counts them
 _BEFORE_SPINS = ("n", "j", "k", "ka", "kc", "v")
@@ -171,7 +171,7 @@ def write_hitran_lines(lines: Lines, path: str | os.PathLike[str], settings: Set
 
     settings: "molecule" (needed), "isotopologue" and "abundance" are what `hitran_lines` asks for.
     """
-    from rotor.formats.hitran import hitran_lines, write_hitran
+    from rotor.formats.lines.hitran import hitran_lines, write_hitran
 
     if "molecule" not in settings:
         raise ValueError(
@@ -184,7 +184,7 @@ def write_hitran_lines(lines: Lines, path: str | os.PathLike[str], settings: Set
 
 def write_records(lines: HitranLines, path: str | os.PathLike[str], settings: Settings) -> None:
     """Write records of HITRAN that were read, without provenance."""
-    from rotor.formats.hitran import write_hitran
+    from rotor.formats.lines.hitran import write_hitran
 
     write_hitran(lines, path)
 

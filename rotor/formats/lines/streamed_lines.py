@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from rotor.formats.atomic_write import atomic_path, open_atomic
-from rotor.formats.line_tables import as_printed
-from rotor.formats.list_pieces import BATCH, Plan, list_plan, make_piece, piece_ranges
+from rotor.formats.lines.line_tables import as_printed
+from rotor.formats.lines.list_pieces import BATCH, Plan, list_plan, make_piece, piece_ranges
+from rotor.formats.lines.sorted_pieces import engine_in, listed, open_folder, row_count, sort_pieces
 from rotor.formats.provenance import write_beside
-from rotor.formats.sorted_pieces import engine_in, listed, open_folder, row_count, sort_pieces
 from rotor.formats.spcat.text.cat import format_lines
 from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.tables import quoted, run

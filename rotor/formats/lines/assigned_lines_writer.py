@@ -6,8 +6,8 @@ import csv
 import os
 
 from rotor.fitting.assignment import Assignments
-from rotor.formats.assigned_lin import as_lin
 from rotor.formats.atomic_write import open_atomic, write_whole
+from rotor.formats.lines.assigned_lin import as_lin
 from rotor.formats.spcat.text.lin import format_lin
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, value_text
 from rotor.units import MHZ_PER_CM
@@ -17,8 +17,8 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
     """Write assigned lines as .lin or .csv; an existing file is replaced at the end or not at all.
 
     In a .lin a blend is lines of one frequency behind each other, so that the lines of a blend are put together, and others of one
-    frequency apart; see `rotor.formats.assigned_lin`. Excluded lines stand behind a blank line, where SPFIT reads nothing. Wavenumbers
-    stand with a negative error.
+    frequency apart; see `rotor.formats.lines.assigned_lin`. Excluded lines follow a blank line, where SPFIT stops reading. Wavenumbers
+    have a negative error.
     """
     text = os.fspath(path).lower()
     if text.endswith(".lin"):

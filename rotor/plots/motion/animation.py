@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.geometry.rotations import rotate, to_matrix
-from rotor.plots.sphere import MOTION, View, clear_view, draw_axes, draw_curve, draw_family, draw_sphere
+from rotor.plots.motion.sphere import MOTION, View, clear_view, draw_axes, draw_curve, draw_family, draw_sphere
 from rotor.version import version
 
 Names = tuple[str, str, str]

@@ -11,8 +11,18 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.classical.tumble import PERIODS, TumbleAnswer
+from rotor.plots.motion.sphere import (
+    LARGE,
+    MIDDLE,
+    MOTION,
+    SMALL,
+    clear_view,
+    draw_axes,
+    draw_curve,
+    draw_family,
+    draw_sphere,
+)
 from rotor.plots.picture import WIDTH_INCHES, Picture, new_figure, styled
-from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, clear_view, draw_axes, draw_curve, draw_family, draw_sphere
 from rotor.version import version
 
 SIZE_INCHES = (WIDTH_INCHES, 3.4)

@@ -30,8 +30,9 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.checks import read_text
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.formats.assigned_lin import with_excluded_lines
-from rotor.formats.assigned_lines_writer import write_assigned_lines as write_assigned_lines
+from rotor.formats.lines.assigned_lin import with_excluded_lines
+from rotor.formats.lines.assigned_lines_writer import write_assigned_lines as write_assigned_lines
+from rotor.formats.lines.species_columns import species_number, with_species
 from rotor.formats.spcat.text.lin import (
     default_note,
     like_line_before,
@@ -41,7 +42,6 @@ from rotor.formats.spcat.text.lin import (
     without_v,
     without_zeros_behind,
 )
-from rotor.formats.species_columns import species_number, with_species
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
@@ -119,7 +119,7 @@ def names_sums(path: str | os.PathLike[str], count: int) -> bool:
     if text.endswith(".csv"):
         return any(name in ("f_upper", "f_lower", "n_upper", "n_lower") for name in _read_csv(path)[0])
     if text.endswith(".lne"):
-        from rotor.formats.westerfit import read_line_table
+        from rotor.formats.internal_rotation.westerfit import read_line_table
 
         return any((labels[:, 0] != 2 * labels[:, 1]).any() for labels in read_line_table(path)[:2])
     if not text.endswith(".lin"):
@@ -160,7 +160,7 @@ def _from_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assig
 
 def _from_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
     """The measured lines of a catalogue."""
-    from rotor.formats.assigned_catalogue import catalogue_lines, whole_catalogue_lines
+    from rotor.formats.lines.assigned_catalogue import catalogue_lines, whole_catalogue_lines
 
     plain = "v" not in names and names[0] != "n"
     return (catalogue_lines if plain else whole_catalogue_lines)(path, names)
@@ -168,7 +168,7 @@ def _from_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple
 
 def _from_westerfit(path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]) -> Assignments:
     """The lines of a line list of westerfit."""
-    from rotor.formats.westerfit import read_line_table
+    from rotor.formats.internal_rotation.westerfit import read_line_table
 
     columns = {"f": 0, "j": 1, "n": 1, "ka": 2, "kc": 3, "species": 4, "vt": 5}
     if not set(names) <= set(columns):

@@ -8,8 +8,8 @@ import numpy as np
 
 from rotor.classical.driven import DrivenAnswer
 from rotor.geometry.rotations import rotate
+from rotor.plots.motion.sphere import LARGE, MIDDLE, MOTION, SMALL
 from rotor.plots.picture import WIDTH_INCHES, Picture, new_figure, styled
-from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL
 from rotor.version import version
 
 SIZE_INCHES = (WIDTH_INCHES, 5.4)

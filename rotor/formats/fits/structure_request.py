@@ -17,7 +17,7 @@ from rotor.requests.readers import Flag, Text
 from rotor.table import Table
 
 if TYPE_CHECKING:
-    from rotor.formats.family_file import FamilyFile
+    from rotor.formats.fits.family_file import FamilyFile
     from rotor.molecules.molecule import Molecule
     from rotor.requests.budget import ErrorBudget
     from rotor.structures.consistency import PlanarMoment, Without

@@ -1,0 +1,1 @@
+"""Files of programs for internal rotation: BELGI, westerfit, XIAM."""

@@ -1,0 +1,1 @@
+"""Pictures of energy levels: term diagrams, levels in fields, torsion, heat capacities."""

@@ -1,0 +1,1 @@
+"""Pictures of lines and spectra: predicted, observed, assigned, fitted."""
