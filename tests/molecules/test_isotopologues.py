@@ -462,7 +462,11 @@ def test_two_atoms_of_a_triplet_ground_state_are_taken_in_it_and_say_so():
     assert (singlet.electronic, singlet.notes) == ("even", ())
     assert Molecule(("O", "S"), [[0, 0, 0], [0, 0, 1.48]]).electronic == "even"  # nothing exchanges its nuclei
     pair = Atoms("O2", [[0, 0, 0], [0, 0, 1.2075]])
-    assert rotor.thermo(pair, pressure_bar=1, temperatures_k=[300]).facts()["electronic"].startswith("degeneracy 3")
+    assert (
+        rotor.thermo(pair, pressure_bar=1, temperatures_k=[300])
+        .facts()["electronic"]
+        .startswith("electronic degeneracy 3 ")
+    )
 
 
 def test_a_geometry_alone_is_taken_for_a_closed_shell_and_says_so():

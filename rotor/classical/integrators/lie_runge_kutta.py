@@ -112,7 +112,7 @@ class LieRungeKutta(Method):
         path = np.empty((len(times), *state.shape))
         state = np.array(state)
         tableau = DOP853.A[:STAGES, :STAGES], DOP853.B[None], DOP853.C[:STAGES], DOP853.E3[:STAGES], DOP853.E5[:STAGES]
-        control = (0.0 if self.fixed_step else self.tolerance, SHRINK, GROW, SAFETY, 8.0)
+        control = (0.0 if self.fixed_step else self.tolerance, SHRINK, GROW, SAFETY, float(ORDER))
         smallest = SMALLEST_STEP * np.abs(np.diff(times))
         arrays = tuple(np.ascontiguousarray(part) for part in tableau)
         forms = system.compiled, system.rolling
@@ -200,7 +200,7 @@ def _factor(error: float) -> float:
     """Factor of the next step for an error estimate, of order 8, in units of the tolerance."""
     if error == 0.0:
         return GROW
-    return float(np.clip(SAFETY * error ** (-1.0 / 8.0), SHRINK, GROW)) if np.isfinite(error) else SHRINK
+    return float(np.clip(SAFETY * error ** (-1.0 / ORDER), SHRINK, GROW)) if np.isfinite(error) else SHRINK
 
 
 def _check_step(step: float, smallest: float, time: float) -> None:
