@@ -32,7 +32,6 @@ from rotor.requests.fill import within
 from rotor.requests.lists import Numbers
 from rotor.requests.readers import Custom, Quantity
 
-Complexes = np.typing.NDArray[np.complex128]
 Axis = tuple[complex, complex, complex]
 
 Z_AXIS: Axis = (0.0, 0.0, 1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -38,8 +38,6 @@ SURELY_MOVED = 12  # peaks of lines with ΔJ ≠ 0: a wrong twin of Q branches h
 LOW_J, LOW_KA, SHIFT_PEAKS = 8, 3, 25  # lines and peaks that tell shifts of A, B and C together
 PEAK_MHZ = 0.1  # half the width of a peak
 MULTIPLES = (2.0, 0.5, 3.0, 1.5, 2 / 3, 1 / 3)
-
-Stop = Callable[[], bool]
 
 
 @dataclass(frozen=True)

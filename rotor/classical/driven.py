@@ -25,7 +25,6 @@ from rotor.classical.tumble import Three
 from rotor.requests.budget import ErrorBudget
 
 Four = tuple[float, float, float, float]
-METHODS = ("lie-runge-kutta", "splitting")
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import MISSING
 from numbers import Real
 from typing import Any
@@ -317,17 +317,22 @@ class Grid(Listed):
             values = (float(raw),)
         else:
             values = tuple(map(float, raw))
-        if not all(map(math.isfinite, values)):
-            raise ValueError(f"{raw!r:.60}: expected finite numbers")
-        if (each := self.each) is None:
-            return values
         try:
-            for value in values:
-                each.check(value)
+            self.check(values)
         except ValueError as error:
             rule = str(error).partition(": ")[2]
             raise ValueError(f"{raw!r:.60}: {rule}" if isinstance(raw, str) else str(error)) from None
         return values
+
+    def check(self, value: Sequence[float]) -> None:
+        """ValueError for no numbers or too many, and for one that is not finite or out of bounds."""
+        if not 0 < len(value) <= self.most_points:
+            raise ValueError(f"{len(value)} numbers: expected 1 to {self.most_points}")
+        if (other := next((number for number in value if not math.isfinite(number)), None)) is not None:
+            raise ValueError(f"{other}: expected finite numbers")
+        if self.each is not None:
+            self.each.check(min(value))
+            self.each.check(max(value))
 
     def show(self, value: Any) -> str:
         """Count, first and last number."""

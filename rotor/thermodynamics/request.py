@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import require_positive, require_top
+from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
@@ -106,10 +106,6 @@ class ThermoRequest:
 
     def __post_init__(self) -> None:
         require_top(self.top)
-        if not len(self.temperatures_k):
-            raise ValueError("temperatures_k: expected at least one temperature")
-        for temperature in self.temperatures_k:
-            require_positive("temperatures_k", temperature, "K")
         check_fields(self)
         names = species_names(self.top)
         if self.species not in names:

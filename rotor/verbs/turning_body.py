@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from rotor.classical.tumble import Three, TumbleRequest
 
 _UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
-MOST_TIMES = 10_000_000
 
 
 def three(raw: Any, unit: str = "") -> Three:

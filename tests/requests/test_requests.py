@@ -21,6 +21,7 @@ from rotor.spectra.raman_request import RamanRequest, answer_raman
 from rotor.spectra.request import GasLayer, SpectrumRequest, answer_spectrum
 from rotor.thermodynamics.gas.classical_gas import GasRequest, answer_gas, settling_times_ps
 from rotor.thermodynamics.gas.thermal_tumble import thermal_tumble
+from rotor.thermodynamics.info_request import InfoRequest
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.thermodynamics.vibration import VibrationalStates
 
@@ -178,8 +179,10 @@ BAD = [
     (lambda top: SpectrumRequest(rotor.Top.from_constants(CO)), "the dipole of this top is not known"),
     (lambda top: GasLayer(0, 1), "pressure_bar: 0: expected a finite number above 0"),
     (lambda top: RamanRequest(top), "the polarizability of this top is not known"),
-    (lambda top: ThermoRequest(top, ()), "temperatures_k: expected at least one temperature"),
+    (lambda top: ThermoRequest(top, ()), "temperatures_k: 0 numbers: expected 1 to"),
     (lambda top: ThermoRequest(top, (300, -1)), "temperatures_k: -1: expected a finite number above 0 K"),
+    (lambda top: InfoRequest(top, temperatures_k=(300, -1)), "temperatures_k: -1: expected a finite number above 0 K"),
+    (lambda top: GasRequest(top, times_ps=(0, math.inf)), "times_ps: inf: expected finite numbers"),
     (lambda top: ThermoRequest(top, species="ortho"), "species: 'ortho': this top has equilibrium; its levels are all of one"),
     (lambda top: ThermoRequest(top, pressure_bar=1), "the ideal gas needs the mass"),
     (lambda top: TumbleRequest((1, 2, 3), (0, 0, 0)), "a body at rest does not tumble"),

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
 
 VERSION = 1
-SUFFIX = ".rotorcat"
 MEMORY_MB = 400
 SCHEMA = """
 CREATE TABLE about (key VARCHAR PRIMARY KEY, value VARCHAR);

@@ -59,20 +59,13 @@ class GasRequest:
         0.99, Quantity(above=0, below=1), "Of the test of equipartition", "observables.confidence"
     )
     times_ps: tuple[float, ...] | None = declared(
-        None, Grid("ps"), "Of the correlation functions: start:stop:count or a comma list (ps)", "observables.times", common=True,
-        example="0:2:201",
+        None, Grid("ps", most_points=MOST_TIMES), "Of the correlation functions: start:stop:count or a comma list (ps)",
+        "observables.times", common=True, example="0:2:201",
     )  # fmt: skip
 
     def __post_init__(self) -> None:
         require_top(self.top)
         check_fields(self)
-        if self.times_ps is not None:
-            if not 0 < len(self.times_ps) <= MOST_TIMES:
-                raise ValueError(
-                    f"times_ps: {len(self.times_ps)} times: a run has at most {MOST_TIMES} times; give fewer"
-                )
-            if not np.isfinite(self.times_ps).all():
-                raise ValueError("times_ps: expected finite times")
 
     @property
     def kt(self) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_positive, require_top
+from rotor.checks import require_top
 from rotor.molecules.bond_rotation import BondRotation, bond_rotation, turning_bonds
 from rotor.molecules.bond_scan import MMFF, POINTS, BondScan
 from rotor.quantum.bond_torsion import BondTorsion
@@ -111,10 +111,6 @@ class TorsionRequest:
             raise ValueError("bond: constants alone have no bonds; give a molecule with its geometry")
         if not self.bond:
             object.__setattr__(self, "bond", _only_bond(self.top.molecule))
-        if not len(self.temperatures_k):
-            raise ValueError("temperatures_k: expected at least one temperature")
-        for temperature in self.temperatures_k:
-            require_positive("temperatures_k", temperature, "K")
         rotation = self.rotation
         if isinstance(self.potential, str) and "=" in self.potential:
             parse_potential(self.potential, rotation)
