@@ -29,7 +29,7 @@ from rotor.requests.fill import Entries, naming, within
 from rotor.requests.readers import Field, Flag, Text, Whole
 from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
-from rotor.verbs.outputs import Files, Report
+from rotor.verbs.outputs import Files, Report, write_text
 from rotor.verbs.verb import Verb, Work
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
@@ -384,8 +384,3 @@ def print_table(write: Callable[[Path], None]) -> None:
         write(path)
         with path.open(encoding="utf-8", newline="") as lines:
             copyfileobj(lines, sys.stdout)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write text as UTF-8 with line feeds."""
-    path.write_text(text, encoding="utf-8", newline="\n")

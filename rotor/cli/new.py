@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rotor.cli.command import write_text
 from rotor.frozen import dataclass
 from rotor.requests.field import declared
 from rotor.requests.readers import Flag, Text
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.outputs import Output
+from rotor.verbs.outputs import Output, write_text
 from rotor.verbs.verb import Tool
 
 EXAMPLES = """\

@@ -19,7 +19,7 @@ from rotor.requests.lists import NameList
 from rotor.requests.readers import Flag, Rule, Text, Whole
 from rotor.table import ColumnTable
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
-from rotor.verbs.outputs import Output, Report, picture, tables
+from rotor.verbs.outputs import Output, Report, picture, tables, write_text
 from rotor.verbs.verb import ErrorsShown, Extra, Verb, Work
 
 if TYPE_CHECKING:
@@ -150,15 +150,11 @@ def failure(answer: FitAnswer) -> str:
     return f"interrupted: {answer.interrupted}; the fit itself is complete" if answer.interrupted else ""
 
 
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
-
-
 def write_table(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the table for a publication."""
     from rotor.formats.fits.fit_request import fit_table
 
-    _text(path, fit_table(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
+    write_text(path, fit_table(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
 
 
 def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
@@ -172,7 +168,7 @@ def write_report(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the full report."""
     from rotor.formats.fits.fit_request import fit_report
 
-    _text(path, fit_report(answer))
+    write_text(path, fit_report(answer))
 
 
 def write_constants(answer: FitAnswer, path: Path, report: Report) -> None:

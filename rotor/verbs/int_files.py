@@ -10,13 +10,14 @@ from rotor.frozen import dataclass
 from rotor.requests.field import all_fields
 from rotor.requests.fill import Entries, NamedError, naming
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
+from rotor.verbs.molecule import FIELDS
 from rotor.verbs.outputs import Report
 from rotor.verbs.verb import Note
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
 
-# inputs of the verb that the .int or its parameter file already determines -> field of the files
+# inputs of the verb that the .int or its parameter file already determines -> field of the files; of a molecule all but its source
 ANSWERED = {
     "conditions.temperature": "TEMP",
     "numerics.jmax": "FEND",
@@ -27,22 +28,16 @@ ANSWERED = {
     "vibration.fundamentals": "QROT",
     "vibration.states": "QROT",
     "outputs.tag": "TAG",
+    **{field.identity: "the constants" for name, field in FIELDS.items() if name != "source"},
     "molecule.dipole": "the dipoles",
     "molecule.dipole_abc": "the dipoles",
-    "molecule.isotopes": "the constants",
-    "molecule.spin_weights": "WTPL and WTMN",
-    "molecule.spin_constants": "the constants",
-    "molecule.spins": "SPIND",
-    "molecule.state_constants": "the constants",
     "molecule.state_dipoles": "the dipoles",
+    "molecule.spin_weights": "WTPL and WTMN",
     "molecule.state_weights": "EWT",
-    "molecule.state_symmetry": "the constants",
-    "molecule.state_names": "the constants",
+    "molecule.spins": "SPIND",
     "effects.hyperfine": "SPIND",
     "effects.hyperfine_method": "SPIND",
     "effects.hyperfine_tolerance": "SPIND",
-    "molecule.constants": "the constants",
-    "molecule.calculator": "the constants",
 }
 
 

@@ -159,6 +159,11 @@ class Files:
         ]
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write text as UTF-8 with line feeds."""
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
 def table_file(name: str, what: str, example: str = "", of: Callable[[Any], Any] | None = None, **more: Any) -> Output:
     """Output for a table in the format that ends its name, such as csv, parquet or profile_csv."""
     kind = name.rpartition("_")[2]

@@ -5,30 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rotor.frozen import dataclass
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title, labelled_rows, states_text
 from rotor.reports.screen import Part, record_table
-from rotor.requests.field import OUTPUT, declared
-from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
 from rotor.verbs.molecule import DIPOLE, REFINEMENT, with_known_polarizability
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Shown, Verb
+from rotor.verbs.verb import LinesShown, Verb
 
 EXAMPLES = """\
   rotor raman N2
   rotor raman CO2 --laser 488 --temperature 500 --csv co2.csv --plot co2.png
   rotor raman HCN --polarizability 3.9,2.0 --temperature 10 --hyperfine
   rotor raman --constants "B=1.98958 cm-1" --polarizability 2.22,1.53 --spin-weights even=2,odd=1"""
-
-
-@dataclass(frozen=True)
-class RamanShown(Shown):
-    """Display options of `raman`."""
-
-    top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
 
 
 def _facts(answer: RamanAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -103,7 +93,7 @@ VERB = Verb(
         (*DIPOLE, "anisotropy", "state_dipoles", *REFINEMENT),
         lambda top, reading, entries: with_known_polarizability(top, reading),
     ),
-    shown=RamanShown,
+    shown=LinesShown,
     content=lambda answer, shown: {"strongest": answer.strongest(shown.top_lines)},
     notes=lambda answer: answer.lines.warnings,
     nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",

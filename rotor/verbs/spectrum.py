@@ -25,7 +25,7 @@ from rotor.verbs.molecule import POLARIZABILITY, range_without_unit, with_some_d
 from rotor.verbs.outputs import PICTURES, Output, Report, draw_answer, picture, table_file, tables
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 from rotor.verbs.subjects import INT_FILE_IN_SCENE, OneMolecule
-from rotor.verbs.verb import Place, Shown, Subject, Verb, Work
+from rotor.verbs.verb import LinesShown, Place, Subject, Verb, Work
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0
@@ -50,7 +50,7 @@ def _hitran_numbers(raw: Any) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class SpectrumShown(Shown):
+class SpectrumShown(LinesShown):
     """Display options of `spectrum`, and options of its files."""
 
     resolution: float | None = option_field(
@@ -64,7 +64,6 @@ class SpectrumShown(Shown):
         None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (columns of text, .npy, FITS): --plot draws both",
         common=True,
     )  # fmt: skip
-    top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
     tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
     hitran_id: tuple[int, int] | None = declared(
         None, Custom(_hitran_numbers, metavar="M:I"), "HITRAN's numbers of molecule and isotopologue, such as 5:1",

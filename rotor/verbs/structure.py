@@ -16,7 +16,7 @@ from rotor.requests.field import MOLECULE, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
 from rotor.table import counted
-from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
+from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables, write_text
 from rotor.verbs.subjects import file_name, saved_inputs
 from rotor.verbs.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
 
@@ -87,7 +87,7 @@ def write_geometry(answer: StructureAnswer, path: Path, report: Report) -> None:
     positions = (molecule.positions_angstrom.round(8) + 0.0).tolist()
     rows = [f"{s:2s} {x:14.8f} {y:14.8f} {z:14.8f}" for s, (x, y, z) in zip(molecule.symbols, positions, strict=True)]
     head = f"{answer.request.file.family.name}, {method}, principal axes a b c"
-    path.write_text("\n".join([str(len(rows)), head, *rows]) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join([str(len(rows)), head, *rows, ""]))
 
 
 def draw(answer: StructureAnswer, path: Path, report: Report) -> None:

@@ -14,7 +14,7 @@ from rotor.frozen import dataclass
 from rotor.reports.screen import Part, json_text, json_with_rows
 from rotor.requests.field import OUTPUT, all_fields, declared
 from rotor.requests.fill import Entries, naming, read_fields, read_instance, written_fields
-from rotor.requests.readers import Field, Flag, Names, Text
+from rotor.requests.readers import Field, Flag, Names, Text, Whole
 from rotor.table import Table
 from rotor.verbs.outputs import Output, Report
 
@@ -92,6 +92,13 @@ class Shown(ErrorsShown):
     """Options of verbs whose report ends with sources."""
 
     sources: bool = declared(False, Flag(), "Print the sources of the numbers in full")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LinesShown(Shown):
+    """Options of verbs whose report has the strongest lines."""
+
+    top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

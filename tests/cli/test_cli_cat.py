@@ -33,7 +33,9 @@ def test_an_int_file_makes_the_programs_catalogue(call, case, tmp_path):
 
 def test_options_that_the_files_answer_are_refused_and_silences_told(call, tmp_path):
     source = str(SAMPLES / "ocs" / "ocs.int")
-    for option in (("--jmax", "3"), ("--temperature", "10 K"), ("--q", "7"), ("--range", "0:9GHz"), ("--tag", "1")):
+    options = [("--jmax", "3"), ("--temperature", "10 K"), ("--q", "7"), ("--range", "0:9GHz"), ("--tag", "1")]
+    options += [("--hessian", "h.txt"), ("--internal-rotation", "geometry"), ("--symmetry-tolerance", "0.1")]
+    for option in options:
         code, _, err = call("spectrum", source, *option)
         assert code == 2
         assert err.startswith(f"error: {option[0]}: {source} determines it")
