@@ -136,8 +136,8 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
     plain = stated["total"] if isinstance(stated, Mapping) else stated
     goals, text = numerics.goals, str(plain).strip()
     percent, bare = text.endswith("%"), _NUMBER.fullmatch(text) and ("" in goals or not numerics.bare)
-    unit = numerics.percent(entries) if percent else "" if bare else next(iter(goals))
-    unit = next(iter(goals)) if percent and unit not in goals else unit
+    unit = numerics.percent(entries) if percent else "" if bare else numerics.first_unit
+    unit = numerics.first_unit if percent and unit not in goals else unit
     if unit not in goals:
         units = ", or ".join(f"{unit} of the {goal.of}" for unit, goal in goals.items())
         raise ValueError(f"accuracy: {plain!r}: expected a unit: {units}")

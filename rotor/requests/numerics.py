@@ -7,6 +7,7 @@ from dataclasses import field
 from typing import Any
 
 from rotor.frozen import dataclass
+from rotor.requests.budget import ErrorTerm
 from rotor.requests.fill import Entries
 from rotor.requests.knob import Knob, knobs_of_fields
 from rotor.requests.plan import Cost, Run, complete_cost
@@ -43,7 +44,7 @@ class Numerics:
     goals: by unit. bare: whether an accuracy may have no unit; it then belongs to the goal "" or, without one, to the first goal.
     percent: the unit that a percentage means, from the entries.
     knobs: that are no fields. prepare: returns the request for their sweeps.
-    describe: fields of a plan from a request and its cost. rounding: error of the highest level from rounding, in MHz.
+    describe: fields of a plan from a request and its cost. rounding: error that no knob lowers, in the unit of the first goal.
     """
 
     goals: Mapping[str, Goal] = field(default_factory=lambda: {"MHz": Goal()})
@@ -52,7 +53,12 @@ class Numerics:
     knobs: tuple[Knob, ...] = ()
     prepare: Callable[[Any], Any] = lambda request: request
     describe: Callable[[Any, Cost], Mapping[str, Any]] | None = None
-    rounding: Callable[[Any], float] | None = None
+    rounding: Callable[[Any], ErrorTerm] | None = None
+
+    @property
+    def first_unit(self) -> str:
+        """The unit of the first goal."""
+        return next(iter(self.goals))
 
     def all_knobs(self, request: Any) -> Iterator[Knob]:
         """All knobs that affect a request: those of its fields first."""

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from rotor.requests.accuracy import Accuracy
-from rotor.requests.budget import ErrorBudget
+from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.fill import naming
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
@@ -111,10 +111,11 @@ def _plan(calculation: Calculation) -> tuple[Plan, Choice | None]:
     choose = partial(goal.chosen, request, calculation.entries, verb.compute, confirmed=False)
     choice, search = timed(choose, LONG_SEARCH)
     plan, parts = plan_of_request(verb, choice.request), [("accuracy", choice.how)]
+    parts += [(knob.title, knob.kept) for knob in numerics.all_knobs(request) if knob.kept]
     if numerics.rounding is not None:
-        parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
-        rounding = _checked(numerics.rounding(choice.request), goal, choice)
-        parts.append(("rounding", f"{rounding:.1e} MHz of the highest energy"))
+        rounding = numerics.rounding(choice.request)
+        _refuse_rounding(rounding, goal, choice)
+        parts.append(("rounding", f"{rounding.value:.1e} {numerics.first_unit} of {rounding.source}"))
     return replace(plan, parts=(*plan.parts, *parts), seconds=(1.0 + choice.confirming) * plan.seconds + search), choice
 
 
@@ -136,11 +137,11 @@ def plan_of_request(verb: Verb, request: Any) -> Plan:
     return Plan(verb.name, seconds=cost.seconds, memory_mb=cost.memory_mb, **described)
 
 
-def _checked(rounding: float, goal: Accuracy, choice: Choice) -> float:
-    """Rounding error of the energies at the highest J in MHz; ValueError if it clearly exceeds the requested accuracy.
+def _refuse_rounding(rounding: ErrorTerm, goal: Accuracy, choice: Choice) -> None:
+    """ValueError for an error of rounding that clearly exceeds the requested accuracy.
 
     The factor of 2: a run omits levels beyond the reach of the distortion constants, so that its rounding may be less.
     """
-    if goal.unit == "MHz" and rounding > 2.0 * goal.value:
-        raise goal.out_of_reach(rounding, choice.how)
-    return rounding
+    size = rounding.value or 0.0
+    if goal.unit == goal.numerics.first_unit and size > 2.0 * goal.value:
+        raise goal.out_of_reach(size, choice.how)

@@ -19,6 +19,7 @@ from rotor.quantum.estimates.accuracy import (
 )
 from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import effect_texts, level_parts, plan_fields
+from rotor.requests.budget import ErrorTerm
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
@@ -72,7 +73,7 @@ def _line_numerics(
     reach: Knob,
     error: Callable[[Any, Any], float],
     describe: Callable[[Any, Any], Mapping[str, Any]],
-    rounding: Callable[[Any], float],
+    rounding: Callable[[Any], ErrorTerm],
 ) -> Numerics:
     """Numerics of a list of lines. names: of the error of a line, of frequencies and of intensities. error: of frequencies in a list."""
     of, frequencies, intensities = names
@@ -186,7 +187,7 @@ def describe_raman(request: Any, cost: Cost) -> dict[str, Any]:
     return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
 
 
-def _raman_rounding(request: Any) -> float:
+def _raman_rounding(request: Any) -> ErrorTerm:
     return rounding_of(request.top, int(answer_raman(request).lines.jmax))
 
 

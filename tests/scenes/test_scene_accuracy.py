@@ -161,7 +161,7 @@ def test_several_spins_by_the_cheapest_method(goal, method):
     exact = run_scene(make_scene("spectrum", molecule=TWO, conditions=JET, numerics=few))
     assert used_method(result.table.levels).method == method
     assert line_error(result.answer.lines, exact.answer.lines) <= result.reached.error <= result.reached.asked
-    assert "orders of distortion" in dict(scene.plan().parts)
+    assert "order of centrifugal distortion" in dict(scene.plan().parts)
 
 
 def test_two_percent_of_a_correlation_function():

@@ -15,6 +15,7 @@ import numpy as np
 
 from rotor.arrays import Floats, matching_rows
 from rotor.quantum.estimates.plans import describe_levels
+from rotor.requests.budget import ErrorTerm
 from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics, numerical_error
 from rotor.requests.plan import Growth
@@ -153,6 +154,7 @@ def distortion(measure: Measure) -> Knob:
         lambda _: "all constants; the orders that they do not have are in the plan",
         key="effects.distortion",
         title="order of centrifugal distortion",
+        kept="all that the constants have: fewer save milliseconds at the most",
         change=lambda request, _, order: replace(request, top=to_order(request.top, order)),
         value=lambda request: _orders(request)[-1],
         fixed=_without_orders,
@@ -212,13 +214,13 @@ def _treated(request: Any, _: str, treatment: Treatment) -> Any:
     )
 
 
-def rounding_of(top: Any, j: int) -> float:
+def rounding_of(top: Any, j: int) -> ErrorTerm:
     """Rounding error (MHz) of the rotational energies of one J."""
     from rotor.quantum.estimates.budgets import rounding_term
     from rotor.quantum.request import LevelsRequest, answer_levels
 
     levels = answer_levels(LevelsRequest(top, jmin=j, jmax=j)).table.levels
-    return rounding_term(levels.energy_mhz).value or 0.0
+    return replace(rounding_term(levels.energy_mhz), source="the highest energy")
 
 
 def by_blocks(top: Top, j: float) -> float:
