@@ -149,7 +149,7 @@ class Knob:
     stated: whether the answer states the error, so that the estimate serves the choice alone. proportional: whether the values are
     decades, and the error about proportional to them. predicted: a value that is tried first. coarsest: value that nothing can be
     coarser than, and the word for it. text: a value in words. refuses: keys of the user that exclude an accuracy, by default that of
-    the knob. kept: why no value is chosen, in a plan.
+    the knob. unchosen: why no value is chosen, in a plan.
 
     Plan. cost: of a request, such as a `Growth`; None if the knob does not decide on it.
     """
@@ -181,7 +181,7 @@ class Knob:
     predicted: Callable[[Sought], Prediction | None] = lambda sought: None
     coarsest: tuple[Any, str] = (None, "")
     text: str | Callable[[Sought, Any], str] = ""
-    kept: str = ""
+    unchosen: str = ""
     refuses: tuple[str, ...] | None = None
     cost: Callable[[Any, Run, Callable[[Any], Any], Callable[[Any, Any], Any]], Cost] | None = None
     field: Field | None = None

@@ -111,7 +111,7 @@ def _plan(calculation: Calculation) -> tuple[Plan, Choice | None]:
     choose = partial(goal.chosen, request, calculation.entries, verb.compute, confirmed=False)
     choice, search = timed(choose, LONG_SEARCH)
     plan, parts = plan_of_request(verb, choice.request), [("accuracy", choice.how)]
-    parts += [(knob.title, knob.kept) for knob in numerics.all_knobs(request) if knob.kept]
+    parts += [(knob.title, knob.unchosen) for knob in numerics.all_knobs(request) if knob.unchosen]
     if numerics.rounding is not None:
         rounding = numerics.rounding(choice.request)
         _refuse_rounding(rounding, goal, choice)

@@ -154,7 +154,7 @@ def distortion(measure: Measure) -> Knob:
         lambda _: "all constants; the orders that they do not have are in the plan",
         key="effects.distortion",
         title="order of centrifugal distortion",
-        kept="all that the constants have: fewer save milliseconds at the most",
+        unchosen="all that the constants have: fewer save milliseconds at the most",
         change=lambda request, _, order: replace(request, top=to_order(request.top, order)),
         value=lambda request: _orders(request)[-1],
         fixed=_without_orders,
