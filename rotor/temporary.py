@@ -34,11 +34,14 @@ def locked_folder(parent: Path, prefix: str) -> Iterator[Path]:
 
 
 def _locked_folder(parent: Path, prefix: str) -> tuple[Path, int | None]:
-    """The folder and its lock; repeated if another process removed the folder, as abandoned, before it was locked."""
+    """The folder and its lock; repeated if another process takes the folder as abandoned before it is locked."""
     while True:
         folder = parent / f"{prefix}{os.urandom(8).hex()}"  # as tempfile.mkdtemp, which takes 2 ms to load
         folder.mkdir(0o700)
-        lock = _lock(folder)
+        try:
+            lock = _lock(folder)
+        except BlockingIOError:  # that process removes it now
+            continue
         if folder.exists():
             return folder, lock
         if lock is not None:
@@ -46,7 +49,10 @@ def _locked_folder(parent: Path, prefix: str) -> tuple[Path, int | None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """An open descriptor that holds the lock of a folder; None if it is locked or gone, or without file locks."""
+    """An open descriptor that holds the lock of a folder; None if it is gone, or without file locks.
+
+    Raises BlockingIOError if another process holds the lock.
+    """
     try:
         import fcntl
     except ImportError:  # Windows
@@ -55,9 +61,11 @@ def _lock(folder: Path) -> int | None:
     try:
         handle = os.open(folder, os.O_RDONLY)
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+    except OSError as error:
         if handle is not None:
             os.close(handle)
+        if isinstance(error, BlockingIOError):
+            raise
         return None
     return handle
 
@@ -65,14 +73,21 @@ def _lock(folder: Path) -> int | None:
 def _remove_abandoned(parent: Path, prefix: str) -> None:
     """Remove folders and lock files of killed processes; those in use are locked."""
     with suppress(OSError):  # the folder cannot be listed
-        for folder in parent.glob(f"{prefix}*"):
-            lock = _lock(folder) if _is_ours(folder) else None
-            if lock is not None:
-                if folder.is_dir():
-                    shutil.rmtree(folder, ignore_errors=True)
-                else:
-                    folder.unlink(missing_ok=True)
-                os.close(lock)
+        for folder in filter(_is_ours, parent.glob(f"{prefix}*")):
+            with suppress(BlockingIOError):
+                _remove_unlocked(folder)
+
+
+def _remove_unlocked(folder: Path) -> None:
+    """Remove a folder or lock file; BlockingIOError if it is in use."""
+    lock = _lock(folder)
+    if lock is None:
+        return
+    if folder.is_dir():
+        shutil.rmtree(folder, ignore_errors=True)
+    else:
+        folder.unlink(missing_ok=True)
+    os.close(lock)
 
 
 def _is_ours(path: Path) -> bool:

@@ -12,10 +12,10 @@ from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, inner_tables,
 from rotor.verbs import SCENE_VERBS
 from rotor.verbs.verb import Verb, verb_of
 
-TAGS = {
-    "pulses": 'shape = "gaussian"  # or switched, kick, table, thz',
-    "effects": 'effect = "constant torque"  # of a body: see docs/scenes.md',
-}
+EXAMPLES = {
+    "pulses": ("gaussian", "or switched, kick, table, thz"),
+    "effects": ("constant torque", "of a body: see docs/scenes.md"),
+}  # the kind that the template shows of a list of several kinds, and where the others are
 
 
 def template(kind: str) -> str:
@@ -51,11 +51,15 @@ def _lines(verb: Verb) -> Iterator[str]:
         else:
             inner[key] = field
     for key, field in inner.items():
-        keys = declared_keys(next(iter(inner_tables(field).values())))
+        kinds, tag = inner_tables(field), []
+        kind, others = EXAMPLES.get(key, (next(iter(kinds)), ""))
+        if isinstance(field.reader, Choices):
+            tag = [f"{field.reader.word} = {toml_value(kind)}  # {others}"]
         is_example = _is_list(field) and shown_default(field) is not None
-        tag = [TAGS[key]] if key in TAGS else []
         yield from _table(
-            f"[[{key}]]" if _is_list(field) else f"[{key}]", [*tag, *_key_lines(keys, key, start)], is_example
+            f"[[{key}]]" if _is_list(field) else f"[{key}]",
+            [*tag, *_key_lines(declared_keys(kinds[kind]), key, start)],
+            is_example,
         )
     for name, keys in tables.items():
         yield from _table(f"[{name}]", _key_lines(keys, name, start), name == "body")

@@ -6,6 +6,7 @@ import gzip
 import importlib.util
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -276,6 +277,26 @@ def test_the_folder_of_an_engine_that_was_killed_is_removed_by_the_next_run(fold
     assert len(begun[0]) == 1
     assert begun[0] != [left]
     assert os.listdir() == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no locks of folders")
+def test_a_new_folder_that_another_process_removes_is_made_again(folder, monkeypatch):
+    """Before it is locked it looks abandoned: a point of a sweep over processes failed, some seconds after the other began."""
+    fcntl = pytest.importorskip("fcntl", reason="no locks of folders")
+    make, handles = Path.mkdir, []
+
+    def taken(path, mode):
+        make(path, mode)
+        if not handles:
+            handles.append(os.open(path, os.O_RDONLY))
+            fcntl.flock(handles[0], fcntl.LOCK_EX)  # as the process that removes it
+
+    monkeypatch.setattr(Path, "mkdir", taken)
+    with unfinished_folder(folder) as made:
+        first, second = sorted(folder.iterdir(), key=lambda path: path == made)
+        shutil.rmtree(first)
+        assert made == second
+    os.close(handles[0])
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no locks of folders")

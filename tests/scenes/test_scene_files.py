@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rotor.classical import effect
 from rotor.requests.readers import Field, Whole
 from rotor.scenes.scene import checked_table, make_scene, parse_scene, read_scene, scene_text, tables_of, write_scene
 from rotor.scenes.schema import json_schema, table_schema
@@ -122,6 +123,14 @@ def test_every_key_of_a_template_may_be_switched_on(kind):
     switched = [re.sub(r"^# (?=[\w.]+ = |\[)", "", line) for line in lines]
     assert len([a for a, b in zip(lines, switched, strict=True) if a != b]) > 5
     assert parse_scene("\n".join(switched)).kind == kind
+
+
+def test_the_effect_of_a_template_has_its_own_keys_in_any_order_of_classes(monkeypatch):
+    """The keys were those of the class that was imported first, beside the name of a constant torque."""
+    subclasses = effect._subclasses
+    monkeypatch.setattr(effect, "_subclasses", lambda base: reversed(list(subclasses(base))))
+    shown = template("tumble").partition("constant torque")[2].partition("[[")[0]
+    assert "# vector = " in shown
 
 
 @pytest.mark.parametrize("kind", SCENE_VERBS)
