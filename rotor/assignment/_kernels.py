@@ -1,4 +1,7 @@
-"""Compiled loops of the search. `rotor.api.line_list` (lines of a top) and loops in the tests are the plain forms."""
+"""Compiled loops of the search. `rotor.api.line_list` (lines of a top) and loops in the tests are the plain forms.
+
+Loops over elements only: expressions of whole arrays, sorting and slices compile several times as long, part of it for the texts of errors.
+"""
 
 from typing import Any
 
@@ -19,6 +22,19 @@ def place(theta: Floats, kappa: float) -> tuple[int, float]:
     x = (angle - theta[0]) / (theta[1] - theta[0])  # an even grid: the place follows without a search
     i = int(min(max(np.floor(x), 1), len(theta) - 3))  # four points of interpolation: two on either side
     return i, x - i
+
+
+@kernel(nogil=True)
+def position(ascending: Floats, value: float) -> int:
+    """Number of elements below a value."""
+    low, high = 0, len(ascending)
+    while low < high:
+        middle = (low + high) >> 1
+        if ascending[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @kernel(nogil=True)
@@ -81,18 +97,36 @@ def lines_in_band(
 
 
 @kernel(nogil=True)
-def derivatives(levels: Floats, theta: Floats, upper: Ints, lower: Ints, rows: Ints, constants: Floats) -> Floats:
-    """∂ν/∂(A, B, C, DJ, DJK, DK, d1, d2) of lines (rows, 8)."""
+def derivatives(
+    levels: Floats, theta: Floats, upper: Ints, lower: Ints, rows: Ints, constants: Floats, out: Floats
+) -> None:
+    """Write ∂ν/∂(A, B, C, DJ, DJK, DK, d1, d2), or the first of them, of lines (rows, n); none for the row -1."""
     kappa = (2 * constants[1] - constants[0] - constants[2]) / (constants[0] - constants[2])
     i, w = place(theta, kappa)
-    out = np.empty((len(rows), 8))
     for n in range(len(rows)):
+        if rows[n] < 0:
+            continue
         u, l = upper[rows[n]], lower[rows[n]]
-        for q in range(8):
+        for q in range(out.shape[1]):
             out[n, q] = (1 - w) * (levels[i, u, q + 1] - levels[i, l, q + 1]) + w * (
                 levels[i + 1, u, q + 1] - levels[i + 1, l, q + 1]
             )
-    return out
+
+
+@kernel(nogil=True)
+def _highest_apart(
+    height: Floats, f: Floats, line_count: int, waiting: Ints, apart: float, row: Ints, out: Ints
+) -> None:
+    """Write the rows of the highest waiting lines in descending order, without lines closer than `apart` to a higher one; then -1."""
+    for at in range(len(out)):
+        best = -1
+        for n in range(line_count):
+            if waiting[n] and (best < 0 or height[n] > height[best]):
+                best = n
+        out[at] = -1 if best < 0 else row[best]
+        for n in range(line_count):
+            if best >= 0 and (n == best or abs(f[best] - f[n]) < apart):
+                waiting[n] = 0
 
 
 @kernel(nogil=True)
@@ -105,38 +139,24 @@ def strongest_lines(
     log_dipoles (tops, 3) : ln μ². Returns rows (tops, 4, count), padded with -1, and ∂ν/∂(A, B, C) (tops, 4, count, 3).
     """
     types = log_dipoles.shape[1]
-    rows = np.full((len(tops), types + 1, count), -1)
-    slopes = np.zeros((len(tops), types + 1, count, 3))
+    rows, slopes = np.empty((len(tops), types + 1, count), np.int64), np.zeros((len(tops), types + 1, count, 3))
     energy, constants = np.empty(len(jj)), np.zeros(8)
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
+    height, waiting = np.empty(len(upper)), np.empty(len(upper), np.int64)
     for t in range(len(tops)):
-        constants[:3] = tops[t]
+        for n in range(3):
+            constants[n] = tops[t, n]
         level_energies(levels, theta, jj, constants, energy)
         line_count = lines_in_band(theta, upper, lower, strength, constants, windows, energy, row, f, s_nu)
-        height = np.empty(line_count)
         for n in range(line_count):
             height[n] = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_K * temperatures[t])
         for q in range(types + 1):
-            taken = np.empty(count)
-            at = 0
-            if q == types:  # lines of all types
-                candidates = np.arange(line_count)
-                height += log_dipoles[t][kind[row[:line_count]]]
-            else:
-                candidates = np.flatnonzero(kind[row[:line_count]] == q)
-            for n in candidates[np.argsort(-height[candidates])]:
-                near = False
-                for m in range(at):
-                    if abs(taken[m] - f[n]) < apart:
-                        near = True
-                        break
-                if near:
-                    continue
-                taken[at], rows[t, q, at] = f[n], row[n]
-                at += 1
-                if at == count:
-                    break
-            slopes[t, q, :at] = derivatives(levels, theta, upper, lower, rows[t, q, :at], constants)[:, :3]
+            for n in range(line_count):
+                waiting[n] = q == types or kind[row[n]] == q
+                if q == types:  # lines of all types
+                    height[n] += log_dipoles[t, kind[row[n]]]
+            _highest_apart(height, f, line_count, waiting, apart, row, rows[t, q])
+            derivatives(levels, theta, upper, lower, rows[t, q], constants, slopes[t, q])
     return rows, slopes
 
 
@@ -144,7 +164,7 @@ def strongest_lines(
 def _windows(f: Floats, sigma: Floats, peaks: Floats, first: Ints, last: Ints) -> None:
     """Write the ranges of peaks within four standard errors of lines."""
     for n in range(len(f)):
-        first[n] = np.searchsorted(peaks, f[n] - 4.0 * sigma[n])
+        first[n] = position(peaks, f[n] - 4.0 * sigma[n])
         last[n] = first[n]
         while last[n] < len(peaks) and peaks[last[n]] <= f[n] + 4.0 * sigma[n]:
             last[n] += 1
@@ -155,7 +175,7 @@ def _joint(
     f: Floats, height: Floats, scale: float, sigma: Floats, first: Ints, last: Ints, peaks: Floats, log_peaks: Floats,
     log_density: Floats, log_threshold: float, spread: float, detected: float, used: Ints, mark: int, gains: Floats, least: float,
 ) -> float:  # fmt: skip
-    """`joint_ratio` of lines with `scale` added to their heights and known ranges of peaks; ended where it stays below `least`.
+    """ln of the likelihood ratio of lines with `scale` added to their heights, from ranges of peaks; ended where it stays below `least`.
 
     gains (lines + 1,) : upper bounds of what the lines from each one on add.
     """
@@ -183,29 +203,14 @@ def _joint(
 
 
 @kernel(nogil=True)
-def joint_ratio(
-    f: Floats, height: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float,
-    spread: float, detected: float,
-) -> float:  # fmt: skip
-    """ln of the likelihood ratio of lines, strongest first, against a random background of peaks; a peak matches only one line.
-
-    height : ln of the expected intensities.
-    """
-    first, last = np.empty(len(f), np.int64), np.empty(len(f), np.int64)
-    _windows(f, sigma, peaks, first, last)
-    mark: Any = np.int64(1)  # a literal has a type of its own, for which the function called is compiled once more
-    return _joint(
-        f, height, 0.0, sigma, first, last, peaks, log_peaks, log_density, log_threshold, spread, detected,
-        np.zeros(len(peaks), np.int64), mark, np.zeros(len(f) + 1), -np.inf,
-    )  # fmt: skip
-
-
-@kernel(nogil=True)
 def joint_ratios_along(
     f: Floats, move: Floats, t: Floats, height: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats,
     log_threshold: float, spread: float, detected: float,
 ) -> Floats:  # fmt: skip
-    """`joint_ratio` of lines at f + t move for each t (n,)."""
+    """ln of the likelihood ratio of lines at f + t move, for each t (n,), against a random background of peaks.
+
+    Lines are strongest first; a peak matches only one line. height : ln of the expected intensities.
+    """
     out, at = np.empty(len(t)), np.empty(len(f))
     first, last = np.empty(len(f), np.int64), np.empty(len(f), np.int64)
     used, gains = np.zeros(len(peaks), np.int64), np.zeros(len(f) + 1)
@@ -291,27 +296,20 @@ def best_scales(
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """For each type, ln of the best likelihood ratio (3,), 0 if no line is above chance, and ln of its intensity scale (3,).
 
-    most : of the strongest lines of each type.
+    Lines are strongest first; `most` of each type count.
     """
-    ratios, scales = np.zeros(3), np.full(3, -np.inf)
+    ratios, scales = np.empty(3), np.empty(3)
+    centre, strength, error = np.empty(len(f)), np.empty(len(f)), np.empty(len(f))
     for q in range(3):
-        rows = np.flatnonzero(kind == q)
-        if len(rows) == 0:
-            continue
-        rows = rows[np.argsort(-expected[rows])][:most]
+        count = 0
+        for n in range(len(f)):
+            if kind[n] == q and count < most:
+                centre[count], strength[count], error[count] = f[n], expected[n], sigma[n]
+                count += 1
         ratios[q], scales[q] = best_scale(
-            f[rows],
-            expected[rows],
-            sigma[rows],
-            peaks,
-            log_peaks,
-            log_density,
-            log_threshold,
-            spread,
-            detected,
-            proposals,
+            centre[:count], strength[:count], error[:count], peaks, log_peaks, log_density, log_threshold, spread, detected, proposals,
             0.0,
-        )
+        )  # fmt: skip
     return ratios, scales
 
 
@@ -337,7 +335,8 @@ def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
     """The first lines in this order, without lines closer than `apart` to a preceding one."""
     out = np.empty(min(most, len(order)), np.int64)
     count = 0
-    for n in order:
+    for k in range(len(order)):
+        n = order[k]
         near = False
         for m in range(count):
             if abs(f[out[m]] - f[n]) < apart:
@@ -363,32 +362,42 @@ def quick_ratios(
     mixed : whether the lines are of several types. The standard error of a line is the larger of `sigma_mhz` and `softness` B. A ratio
     of lines of one type below `least` counts as 0.
     """
-    out, best = np.full(len(tops), -np.inf), np.zeros(len(tops))
+    out, best = np.empty(len(tops)), np.zeros(len(tops))
     energy = np.empty(len(jj))
-    proposals: Any = np.int64(8)  # not a literal, as in `joint_ratio`
+    proposals: Any = np.int64(8)  # a literal has a type of its own, for which the function called is compiled once more
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
+    strength_at, below, expected = np.empty(len(upper)), np.empty(len(upper)), np.empty(len(upper))
+    centre, height, sigma, types = np.empty(most), np.empty(most), np.empty(most), np.empty(most, np.int64)
     for t in range(len(tops)):
+        out[t] = -np.inf
         rigid_energies(reduced, theta, jj, tops[t], energy)
         count = lines_in_band(theta, upper, lower, strength, tops[t], windows, energy, row, f, s_nu)
         if count == 0:
             continue
-        strength_at, below = np.log(s_nu[:count]), energy[lower[row[:count]]] / MHZ_PER_K
-        for temperature in temperatures:
-            expected = strength_at - below / temperature
-            chosen = _apart(_highest(expected, 2 * most), f, most, apart)
-            sigma = np.full(len(chosen), max(sigma_mhz, softness * tops[t, 1]))
+        for line in range(count):
+            strength_at[line], below[line] = np.log(s_nu[line]), energy[lower[row[line]]] / MHZ_PER_K
+        for n in range(len(temperatures)):
+            for line in range(count):
+                expected[line] = strength_at[line] - below[line] / temperatures[n]
+            chosen = _apart(_highest(expected[:count], 2 * most), f, most, apart)
+            size = len(chosen)
+            for line in range(size):
+                at = chosen[line]
+                centre[line], height[line], types[line] = f[at], expected[at], kind[row[at]]
+                sigma[line] = max(sigma_mhz, softness * tops[t, 1])
             if mixed:
-                ratio = best_scales(
-                    f[chosen], expected[chosen], kind[row[chosen]], sigma, peaks, log_peaks, log_density, log_threshold, spread,
+                ratios, _ = best_scales(
+                    centre[:size], height[:size], types[:size], sigma[:size], peaks, log_peaks, log_density, log_threshold, spread,
                     detected, most, proposals,
-                )[0].sum()  # fmt: skip
+                )  # fmt: skip
+                ratio = ratios[0] + ratios[1] + ratios[2]
             else:
                 ratio = best_scale(
-                    f[chosen], expected[chosen], sigma, peaks, log_peaks, log_density, log_threshold, spread, detected, proposals,
-                    max(least, out[t]),
+                    centre[:size], height[:size], sigma[:size], peaks, log_peaks, log_density, log_threshold, spread, detected,
+                    proposals, max(least, out[t]),
                 )[0]  # fmt: skip
             if ratio > out[t]:
-                out[t], best[t] = ratio, temperature
+                out[t], best[t] = ratio, temperatures[n]
     return out, best
 
 
@@ -402,10 +411,11 @@ def nearest_peaks(
     It lies within `window` errors, among fewer than `most` peaks, its height within three `spread`, and fewer than `most_chance` such peaks
     are expected by chance.
     """
-    out = np.full(len(centre), -1)
+    out = np.empty(len(centre), np.int64)
     for n in range(len(centre)):
+        out[n] = -1
         reach = window * errors[n]
-        first, last = np.searchsorted(peaks, centre[n] - reach), np.searchsorted(peaks, centre[n] + reach)
+        first, last = position(peaks, centre[n] - reach), position(peaks, centre[n] + reach)
         if last - first >= most:  # a crowd of peaks does not tell which is the line
             continue
         best, lowest = -1, np.inf

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.assignment._kernels import position
 from rotor.kernels import kernel
 
 Floats = NDArray[np.float64]
@@ -56,18 +57,15 @@ def _inside(a: float, b: float, c: float, bounds: Floats, margin: float, planar:
     )  # fmt: skip
 
 
-@kernel(nogil=True, fastmath=True)
 def _linear(difference: Floats, jj: Floats, kappa: Floats) -> Floats:
     """At each κ (κ, 6): factors of the first two lines of a family in ½(A+C), 1/determinant, factors in the third line, and κ."""
-    out = np.empty((len(kappa), 6))
-    for k in range(len(kappa)):
-        first, second, third = difference[0, k], difference[1, k], difference[2, k]
-        determinant = jj[0] * second - jj[1] * first
-        inverse = 0.0 if abs(determinant) < 1e-6 else 1 / determinant  # parallel lines: this κ has no solution
-        mean_a, mean_b = second * inverse, -first * inverse
-        out[k, 0], out[k, 1], out[k, 2], out[k, 5] = mean_a, mean_b, inverse, kappa[k]
-        out[k, 3], out[k, 4] = jj[2] * mean_a - third * jj[1] * inverse, jj[2] * mean_b + third * jj[0] * inverse
-    return out
+    first, second, third = difference
+    determinant = jj[0] * second - jj[1] * first
+    determinant[np.abs(determinant) < 1e-6] = np.inf  # parallel lines: this κ has no solution
+    inverse = 1 / determinant
+    mean_a, mean_b, third = second * inverse, -first * inverse, third * inverse
+    columns = mean_a, mean_b, inverse, jj[2] * mean_a - jj[1] * third, jj[2] * mean_b + jj[0] * third, kappa
+    return np.ascontiguousarray(np.array(columns).T)
 
 
 @kernel(nogil=True, fastmath=True)
@@ -93,15 +91,15 @@ def _narrowed(low: float, high: float, value: float, slope: float, least: float,
     return max(low, min(at_least, at_most)), min(high, max(at_least, at_most))
 
 
-@kernel(nogil=True)
-def _most_asymmetric(kappa: float, planar: float) -> float:
-    """The largest (A-C)/(A+C) of tops with C (A+B) > planar A B.
+def _most_asymmetric(kappa: Floats, planar: float) -> Floats:
+    """The largest (A-C)/(A+C) of tops with C (A+B) > planar A B at each κ.
 
     With u = (A-C)/(A+C) the condition is 2-p + ((1-p)(1+κ) - 2) u - (1 + (1+p) κ) u² > 0; it holds at 0 and fails at 1.
     """
     square, linear, constant = -(1 + (1 + planar) * kappa), (1 - planar) * (1 + kappa) - 2.0, 2 - planar
-    root = np.sqrt(max(linear * linear - 4 * square * constant, 0.0))  # rounding at the edge of the band
-    return float(2 * constant / (root - linear))
+    root = np.sqrt(np.maximum(linear * linear - 4 * square * constant, 0.0))  # rounding at the edge of the band
+    largest: Floats = 2 * constant / (root - linear)
+    return largest
 
 
 @kernel(nogil=True)
@@ -146,34 +144,25 @@ def _seconds_within(
 @kernel(nogil=True)
 def _kappa_ranges(begin: Ints, end: Ints, opening: Ints, closing: Ints) -> None:
     """Write for each seed the first κ, and the last plus 1, at which it lies in the range of second lines."""
-    opening[:], closing[:] = len(begin), 0
+    for b in range(len(opening)):
+        opening[b], closing[b] = len(begin), 0
     for step in range(len(begin)):
         for b in range(begin[step], end[step]):
             opening[b], closing[b] = min(opening[b], step), step + 1  # the last κ plus 1
 
 
 @kernel(nogil=True, fastmath=True)
-def sweep(
-    difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
-    near: Bytes, low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,
-    bounds: Floats, need: int, stride: int, out: Floats,
+def _write_roots(
+    linear: Floats, coarse: Ints, largest: Floats, jj: Floats, companions: Floats, companion_jj: Floats, seeds: Floats,
+    log_seeds: Floats, near: Bytes, low: float, high: float, per_mhz: float, tolerance: float, softness: float,
+    ratio: float, bounds: Floats, need: int, looks: Floats, out: Floats,
 ) -> int:  # fmt: skip
-    """Write the roots of a family and return their number: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed.
-
-    difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (κ, n), companion_jj (n,) : of the predicted
-    near : distance from each bin's centre to the nearest peak in fifths of `bin_width`, at most 255; a hit is nearer than the larger of
-    `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : grid points of κ between tests for a crossing.
-    out (m, 5) : hits, misses, A, B, C
-    """
+    """`sweep` with the solutions at all κ, and at the coarse points between which crossings are looked for."""
     # a literal 0 has a type of its own, for which the functions called are compiled once more
     nowhere: Any = np.int64(0)
-    n, points, roots, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
-    linear = _linear(difference, jj, kappa)
-    coarse = np.minimum(np.arange((points + stride - 2) // stride + 1) * stride, points - 1)
-    looks, begin, end = linear[coarse], np.empty(len(coarse), np.int64), np.empty(len(coarse), np.int64)
+    roots: Any = np.int64(0)
+    n, begin, end = len(seeds), np.empty(len(coarse), np.int64), np.empty(len(coarse), np.int64)
     opening, closing = np.empty(n, np.int64), np.empty(n, np.int64)
-    # a wider limit than at the roots, as κ stands on a grid
-    largest = np.array([_most_asymmetric(x, 0.95) for x in looks[:, 5]])
     for a in range(n):
         sa = seeds[a]
         _seconds_within(sa, jj, looks, largest, seeds, bounds, begin, end)
@@ -183,14 +172,14 @@ def sweep(
                 continue
             sb = seeds[b]
             above = jj[0] * sb - jj[1] * sa
-            before, p, at = -1.0, 0, nowhere
+            before, p, at = -1.0, nowhere, nowhere
             for step in range(opening[b], closing[b]):
                 if b < begin[step] or b >= end[step]:
                     before = -1.0  # a new stretch of κ: no crossing with what was before it
                     continue
                 k, third = coarse[step], sa * looks[step, 3] + sb * looks[step, 4]
                 if before < 0.0:
-                    before, at, p = max(third, 0.0), k, np.searchsorted(seeds, max(third, 0.0))
+                    before, at, p = max(third, 0.0), k, position(seeds, max(third, 0.0))
                     continue
                 rising = third > before
                 while (rising and p < n and seeds[p] <= third) or (not rising and p > 0 and seeds[p - 1] >= third):
@@ -204,11 +193,33 @@ def sweep(
                     # the third line has no such frequency, or the top is out of bounds
                     if w < 0.0 or not _inside(s + d, top_b, s - d, bounds, 0.0, 0.985):
                         continue
-                    reach = min(max(tolerance, softness * top_b) * fifths, 255.0)
+                    reach = min(max(tolerance, softness * top_b), 255.0)
                     hits, misses = _hits(companion_jj, companions, i, w, s, d, near, low, high, per_mhz, reach)
                     if hits >= need and hits >= misses and roots < len(out):
                         out[roots, 0], out[roots, 1] = hits, misses
                         out[roots, 2], out[roots, 3], out[roots, 4] = s + d, top_b, s - d
                         roots += 1
                 before, at = third, k
-    return roots
+    return int(roots)
+
+
+def sweep(
+    difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
+    near: Bytes, low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,
+    bounds: Floats, need: int, stride: int, out: Floats,
+) -> int:  # fmt: skip
+    """Write the roots of a family and return their number: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed.
+
+    difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (κ, n), companion_jj (n,) : of the predicted
+    near : distance from each bin's centre to the nearest peak in fifths of `bin_width`, at most 255; a hit is nearer than the larger of
+    `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : grid points of κ between tests for a crossing.
+    out (m, 5) : hits, misses, A, B, C
+    """
+    linear, fifth = _linear(difference, jj, kappa), bin_width / 5
+    coarse = np.minimum(np.arange((len(kappa) + stride - 2) // stride + 1) * stride, len(kappa) - 1)
+    # a wider limit than at the roots, as κ stands on a grid
+    largest = _most_asymmetric(kappa[coarse], 0.95)
+    return _write_roots(
+        linear, coarse, largest, jj, companions, companion_jj, seeds, log_seeds, near, low, high, 1 / bin_width, tolerance / fifth,
+        softness / fifth, ratio, bounds, need, linear[coarse], out,
+    )  # fmt: skip

@@ -14,15 +14,14 @@ from itertools import combinations
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment import _kernels
 from rotor.assignment.bounds import Bounds
 from rotor.assignment.families import Family
 from rotor.assignment.grown import Grown
 from rotor.assignment.growth import grow
-from rotor.assignment.likelihood import Merged, merged_lines, predict
+from rotor.assignment.likelihood import Merged, merged_lines, predict, ratio_at
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
-from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field, alike
+from rotor.assignment.search import Candidate, Field, alike
 from rotor.molecules.molecule import Molecule
 from rotor.tops.isotopes.isotopologues import isotopologues
 from rotor.tops.top import Top
@@ -184,11 +183,7 @@ def _shifts(peaks: PeakList, lines: Merged, three: Ints, expected: Expected) -> 
 def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> float:
     """ln of the likelihood ratio of the visible lines at shifted constants."""
     centre = lines.centre[visible] + lines.slope[visible, :3] @ shift
-    value = _kernels.joint_ratio(
-        centre, lines.height[visible], np.full(len(visible), ROUGH_MHZ), peaks.frequency_mhz, peaks.log_intensity,
-        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED,
-    )  # fmt: skip
-    return float(value)
+    return ratio_at(peaks, centre, lines.height[visible], ROUGH_MHZ)
 
 
 def _like(grown: Grown, scales: Floats) -> bool:

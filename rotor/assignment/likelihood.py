@@ -12,6 +12,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
+from rotor.assignment.peaks import PeakList
 from rotor.assignment.search import DETECTED, SPREAD, Field
 from rotor.units import MHZ_PER_K
 
@@ -58,7 +59,8 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
 def line_slopes(field: Field, rows: Ints, constants: Floats) -> Floats:
     """∂ν/∂c of lines (rows, 8)."""
     table = field.table
-    slopes: Floats = _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants)
+    slopes = np.empty((len(rows), 8))
+    _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants, slopes)
     return slopes
 
 
@@ -122,13 +124,12 @@ def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0
     # at least thirty lines, however uncertain
     sharp = errors <= max(SHARP_MHZ, float(np.partition(errors, min(30, len(errors) - 1))[min(30, len(errors) - 1)]))
     strength = lines.expected[sharp] + lines.energy[sharp] / (MHZ_PER_K * TEMPERATURES[-1])
-    peaks, best, temperature = field.peaks, -np.inf, TEMPERATURES[0]
+    best, temperature = -np.inf, TEMPERATURES[0]
     for t in TEMPERATURES:
         expected = strength - lines.energy[sharp] / (MHZ_PER_K * t)
-        ratios, _ = _kernels.best_scales(
-            lines.frequency[sharp], expected, lines.kind[sharp], errors[sharp], peaks.frequency_mhz, peaks.log_intensity,
-            peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, 300, 6,
-        )  # fmt: skip
+        ratios, _ = _ratios_of_types(
+            field.peaks, lines.frequency[sharp], expected, lines.kind[sharp], errors[sharp], 300, 6
+        )
         if ratios.sum() > best:
             best, temperature = float(ratios.sum()), t
     return temperature
@@ -136,21 +137,31 @@ def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0
 
 def type_ratios(field: Field, lines: Predicted, errors: Floats, most: int) -> tuple[Floats, Floats]:
     """Likelihood ratios and scales by type, from the strongest lines of each; errors of lines (lines,)."""
-    peaks = field.peaks
-    ratios: tuple[Floats, Floats] = _kernels.best_scales(
-        lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
-        peaks.log_threshold, SPREAD, DETECTED, most, 16,
+    return _ratios_of_types(field.peaks, lines.frequency, lines.expected, lines.kind, errors, most, 16)
+
+
+def _ratios_of_types(
+    peaks: PeakList, frequency: Floats, expected: Floats, kind: Ints, errors: Floats, most: int, proposals: int
+) -> tuple[Floats, Floats]:
+    """Likelihood ratios and scales by type (3,), from the strongest lines of each; scales are proposed by the first of them."""
+    order = np.argsort(-expected, kind="stable")
+    return _kernels.best_scales(
+        frequency[order], expected[order], kind[order], errors[order], peaks.frequency_mhz, peaks.log_intensity,
+        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, most, proposals,
     )  # fmt: skip
-    return ratios
 
 
 def joint_ratio(field: Field, constants: Floats, lines: Predicted, scales: Floats, sigma0: float) -> float:
     """ln of the likelihood ratio of the lines of all types; lines of a peak are merged, and each peak is matched once."""
     merged = merged_lines(field, constants, lines, scales)
     order = np.argsort(-merged.height, kind="stable")
-    peaks = field.peaks
-    value = _kernels.joint_ratio(
-        merged.centre[order], merged.height[order], np.full(len(order), sigma0), peaks.frequency_mhz, peaks.log_intensity,
+    return ratio_at(field.peaks, merged.centre[order], merged.height[order], sigma0)
+
+
+def ratio_at(peaks: PeakList, centre: Floats, height: Floats, error: float) -> float:
+    """ln of the likelihood ratio of lines, strongest first, with one standard error; each peak is matched once."""
+    ratios = _kernels.joint_ratios_along(
+        centre, np.zeros(len(centre)), np.zeros(1), height, np.full(len(centre), error), peaks.frequency_mhz, peaks.log_intensity,
         peaks.log_density, peaks.log_threshold, SPREAD, DETECTED,
     )  # fmt: skip
-    return float(value)
+    return float(ratios[0])

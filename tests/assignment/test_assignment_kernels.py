@@ -11,6 +11,7 @@ from rotor.arrays import Floats
 from rotor.assignment import _kernels, _sweep
 from rotor.assignment.bounds import Bounds
 from rotor.assignment.families import families
+from rotor.assignment.likelihood import ratio_at
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.assignment.rigid_table import JMAX, rigid_table
 from rotor.assignment.search import (
@@ -143,14 +144,6 @@ def plain_joint(f: Floats, height: Floats, sigma: Floats, peaks: PeakList) -> fl
     return float(total)
 
 
-def compiled_joint(f: Floats, height: Floats, sigma: Floats, peaks: PeakList) -> float:
-    return float(
-        _kernels.joint_ratio(
-            f, height, sigma, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density, peaks.log_threshold, SPREAD, DETECTED,
-        )
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_likelihood_ratio_is_the_product_of_lines(seed: int) -> None:
     rng, peaks = np.random.default_rng(seed), field_of(seed).peaks
@@ -158,7 +151,7 @@ def test_the_likelihood_ratio_is_the_product_of_lines(seed: int) -> None:
         [peaks.frequency_mhz[::2] + 0.1 * rng.normal(size=len(peaks.frequency_mhz[::2])), rng.uniform(8000, 18000, 9)]
     )
     height, sigma = rng.uniform(1.0, 4.0, len(f)), np.full(len(f), 0.2)
-    value = compiled_joint(f, height, sigma, peaks)
+    value = ratio_at(peaks, f, height, 0.2)
     assert value == pytest.approx(plain_joint(f, height, sigma, peaks), rel=1e-12)
     assert value != pytest.approx(plain_joint(f + 0.05, height, sigma, peaks), rel=1e-3)
 
@@ -218,7 +211,7 @@ def test_second_lines_within_the_bounds(seed: int) -> None:
     seeds, bounds = np.sort(rng.uniform(2000, 30000, 200)), BOUNDS.array
     linear = _sweep._linear(difference, jj, kappa)
     begin, end = np.empty(25, np.int64), np.empty(25, np.int64)
-    largest = np.array([_sweep._most_asymmetric(x, 0.95) for x in kappa])
+    largest = _sweep._most_asymmetric(kappa, 0.95)
     inside = 0
     for first in seeds[::10]:
         _sweep._seconds_within(first, jj, linear, largest, seeds, bounds, begin, end)
