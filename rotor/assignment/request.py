@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # default bounds of A, B, C
 TRIED_K = (1.0, 2.0, 4.0, 8.0)
+LEAST_A_MHZ = 50.0  # of a guess; the least bound of A without one is far above, and guesses in GHz are below
 GUESS_ERROR = 0.033  # of a guess: 3 % and a little
 ROOT_MARGINS = (0.15, 0.03, 0.03)  # of A, B, C of roots beyond the error of a guess
 
@@ -83,6 +84,11 @@ class AssignRequest:
         for a, b, c in self._guesses:
             if not a > b > c > 0:
                 raise ValueError(f"guess_mhz: {self.guess_mhz}: expected A > B > C > 0")
+            if a < LEAST_A_MHZ:
+                raise ValueError(
+                    f"guess_mhz: A = {a:g} MHz: no lines of such a top can be searched; another unit stands behind the numbers, "
+                    "as in 9,3,2.4GHz"
+                )
         if self.isotopologues and self.molecule is None:
             raise ValueError(
                 "isotopologues: a geometry of the first species is needed; give it as the molecule (--molecule FILE)"

@@ -91,12 +91,14 @@ class SceneRun:
     scene: Scene
     result: Outcome
     failure: str = ""
+    remarks: tuple[str, ...] = ()
 
     @property
     def notes(self) -> list[str]:
-        """Remarks on the molecule and on the answer, each once."""
-        top = getattr(self.result.request, "top", None)
-        return list(dict.fromkeys([*(top.notes if top is not None else ()), *self.facts().get("notes", ())]))
+        """Remarks on the inputs and on the answer, each once."""
+        result = self.result
+        remarks = [*self.remarks, *result.verb.notes(result.answer), *self.facts().get("notes", ())]
+        return list(dict.fromkeys(remarks))
 
     def facts(self) -> dict[str, Any]:
         """The facts of the answer, and those of the run."""
@@ -214,7 +216,9 @@ def _single(scene: Scene, options: Options, pool: Executor | None) -> SceneRun:
     from rotor.scenes.run import run_scene
 
     with elapsed_time("computing"):
-        return SceneRun(options, scene, run_scene(scene, folder=options.folder, out=options.out, executor=pool))
+        remarks = list[str]()
+        result = run_scene(scene, folder=options.folder, out=options.out, executor=pool, note=remarks.append)
+        return SceneRun(options, scene, result, remarks=tuple(remarks))
 
 
 def _accuracy(result: Outcome) -> list[tuple[str, str]]:

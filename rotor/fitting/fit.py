@@ -17,7 +17,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, levels_in
-from rotor.fitting.fit_notes import fit_notes
+from rotor.fitting.fit_notes import fit_notes, start_notes
 from rotor.fitting.parameters import Parameters
 from rotor.fitting.result import Fit
 from rotor.fitting.search import FitOptions as FitOptions
@@ -97,10 +97,11 @@ def fit_lines(
     if few := too_few(lines, used, parameters):
         raise ValueError(f"{lines.source or 'the lines'}: {few}")
     search = Search(lines, level_model, parameters, options, upper, lower, sigma, used)
+    noted = [*missing, *start_notes(search)]
     search, minimum, rejected = with_rejection(search, options, progress)
     left_out |= rejected
     fit = _finished(search, minimum, constants, left_out, labels)
-    return replace(fit, notes=(*missing, *fit.notes))
+    return replace(fit, notes=(*noted, *fit.notes))
 
 
 def _model_from_labels(constants: ConstantSet | None, options: FitOptions) -> Callable[[Ints], LevelModel]:

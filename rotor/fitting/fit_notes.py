@@ -8,8 +8,12 @@ import numpy as np
 
 from rotor.fitting.assignment import Assignments, duplicates
 from rotor.fitting.result import Fit
+from rotor.fitting.search import Search
 from rotor.statistics.least_squares import BENT
 from rotor.table import counted
+
+APART = 100.0  # ratio of measured and calculated frequencies that a start in the same unit does not have
+MUCH = 1e3  # times the median error: a line of a list of several methods is not so vague
 
 
 def repeated_text(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
@@ -22,6 +26,30 @@ def repeated_text(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
         f"the first: {lines.text(int(second[0]))}; the largest difference is "
         f"{apart[worst]:.4g} MHz, of {lines.text(int(second[worst]))}"
     )
+
+
+def start_notes(search: Search) -> list[str]:
+    """Notes on numbers in a unit that is hardly meant: frequencies far from those of the start, errors far above the others."""
+    lines, used, calculated = search.lines, search.used, search.line_values(search.parameters.start).calculated
+    notes = list[str]()
+    compared = used & ~lines.from_zero & (calculated != 0)
+    with np.errstate(over="ignore"):
+        ratio = (
+            float(np.median(np.abs(lines.frequency_mhz[compared] / calculated[compared]))) if compared.any() else 1.0
+        )
+    if not 1 / APART < ratio < APART:
+        notes.append(
+            f"the lines have {ratio:.3g} times the frequencies of the start; are both in the units that they state?"
+        )
+    usual = float(np.median(search.sigma[used]))
+    vague = used & (search.sigma > MUCH * usual) & (search.sigma > 0.01 * np.abs(lines.frequency_mhz))
+    for i in np.flatnonzero(vague).tolist()[:3]:
+        at = f"{lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
+        notes.append(
+            f"line {lines.number(i)}, {at}, hardly counts: its error is {search.sigma[i]:.6g} MHz, "
+            f"the median {usual:.3g}; is there a comma in a decimal number?"
+        )
+    return notes
 
 
 def unlikely_lines(lines: Assignments) -> list[str]:

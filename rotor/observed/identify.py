@@ -149,7 +149,8 @@ def identify(
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
     known = [candidate for candidate in candidates if len(candidate.between(first, last))]
     if not known:
-        raise ValueError(f"none of {len(candidates)} candidates has a line {band_text(first, last)}")
+        species = f"none of {len(candidates)} candidates" if candidates else "no species"
+        raise ValueError(f"{species} has a line {band_text(first, last)}")
     velocity, width = velocity_and_width(spectrum, known, choices.velocity_km_s, choices.fwhm_km_s, sight)
     bank = Templates(spectrum, known, choices, velocity, width, sight)
     search = Selection(spectrum, known, sight, choices, bank, progress)

@@ -25,6 +25,7 @@ UNITS = (KELVIN, JANSKY_PER_BEAM, ABSORBANCE, VOLT)
 ARCSEC = math.pi / 180 / 3600
 _CLIP = 3.0
 _LOW_MHZ = 1000.0  # a band below has hardly a rotational line; in GHz it is that of most telescopes
+_HIGH_MHZ = 1e9  # above visible light
 _MAD = 1.4826
 _LEAST_CHANNELS = 16
 
@@ -175,7 +176,8 @@ def band_text(first_mhz: float, last_mhz: float) -> str:
     >>> band_text(84e3, 116e3), band_text(84.0, 116.0)
     ('from 84000 to 116000 MHz', 'from 84 to 116 MHz; for a file in GHz give --axis-unit GHz')
     """
-    hint = "; for a file in GHz give --axis-unit GHz" if last_mhz < _LOW_MHZ else ""
+    unit = "GHz" if last_mhz < _LOW_MHZ else "Hz" if first_mhz > _HIGH_MHZ else ""
+    hint = f"; for a file in {unit} give --axis-unit {unit}" if unit else ""
     return f"from {first_mhz:.10g} to {last_mhz:.10g} MHz{hint}"
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from rotor.scenes.scene import SCHEMA, Scene, checked_scene, keyed, scene_of, scene_text
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.outputs import Files
-from rotor.verbs.verb import Work, verb_of
+from rotor.verbs.verb import Note, Work, silent, verb_of
 
 Where = str | os.PathLike[str]
 
@@ -23,6 +23,7 @@ def run_scene(
     folder: Where = ".",
     out: Where = ".",
     executor: Executor | None = None,
+    note: Note = silent,
 ) -> Outcome:
     """Run one scene.
 
@@ -36,6 +37,8 @@ def run_scene(
         Folder of the files that the scene writes.
     executor : Executor, optional
         Shares the work: J, blocks or states.
+    note : callable, optional
+        Takes remarks on the inputs.
 
     Returns
     -------
@@ -59,16 +62,16 @@ def run_scene(
     files = files_of(scene, out)
     with ExitStack() as stack:
         files.lock(stack)
-        outcome = scene_calculation(scene, folder, out).run(executor)
+        outcome = scene_calculation(scene, folder, out, note).run(executor)
         files.write({"json": lambda path: outcome.write_table(outcome.table, path), **outcome.writers})
     return outcome
 
 
-def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".") -> Calculation:
-    """The calculation of a scene. folder: of the files that it reads. out: of those that it writes."""
+def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".", note: Note = silent) -> Calculation:
+    """The calculation of a scene. folder: of the files that it reads. out: of those that it writes. note: takes remarks."""
     verb, entries, files = verb_of(scene.kind), scene.entries, paths_of(scene, out)  # no other verb is imported
     provenance = {"scene": scene_text(scene)} if files else {}
-    work = Work(shown=verb.read_shown(entries), files=files, provenance=provenance, from_scene=True)
+    work = Work(None, verb.read_shown(entries), files, note, provenance=provenance, from_scene=True)
     return Calculation(verb, entries, work, folder, scene.accuracy)
 
 

@@ -182,8 +182,10 @@ def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
     yield f"{', '.join(request.names)}: brightness temperature, from {first:.10g} to {last:.10g} MHz"
     yield _facts(answer)
     if not len(lines):
-        none = "no lines: none is inside the range and deep enough; widen --range or lower --least-depth"
-        yield f"{none}{range_without_unit(report.entries)}\n"
+        why = "none is inside the range and deep enough; widen --range or lower --least-depth"
+        if all(map(_is_dark, request.molecules)):
+            why = "without a dipole moment a molecule emits none"
+        yield f"no lines: {why}{range_without_unit(report.entries)}\n"
     yield _table(answer, report.shown.top_lines)
     cited = "; ".join(
         f"{name}: {molecule.source if report.sources else short_source(molecule.source)}"
@@ -193,6 +195,11 @@ def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
     yield [("sources", cited), *error_facts(report.content.get("errors")), *_limits(answer, report.with_spins)]
 
 
+def _is_dark(molecule: Top | CatalogueLines) -> bool:
+    """Whether a molecule has no dipole moment."""
+    return isinstance(molecule, Top) and not any(molecule.dipole_abc_debye or ())
+
+
 def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
     request, layer = answer.request, answer.request.sources[0]
     behind = f"background {layer.background_k:g} K as observed, filling {layer.filling:g}"
@@ -200,11 +207,12 @@ def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
         ("source", behind + (f", redshift {layer.redshift:g}" if layer.redshift else "")),
         ("lines", f"{len(answer.lines)}; velocities in the radio convention, v = c (1 - ν/ν_rest)"),
     ]
-    for name, source, lines in zip(request.names, request.sources, answer.emitted, strict=True):
+    for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
         gas = f"N = {source.column_per_cm2:.4g} /cm², T_ex = {source.excitation_k:g} K"
         motion = f"width {source.fwhm_km_s:g} km/s at {source.velocity_km_s:g} km/s"
         quanta = f"; upper, lower: {headings(lines.quanta)}" if lines.quanta else ""
-        facts.append((name, f"{gas}, {motion}, Q = {lines.q:.6g}{quanta}"))
+        dark = "; no dipole moment, no lines" if _is_dark(top) else ""
+        facts.append((name, f"{gas}, {motion}, Q = {lines.q:.6g}{quanta}{dark}"))
     for name, lines in zip(request.names, answer.emitted, strict=True):
         prefix = f"{name}: " if len(request.names) > 1 else ""
         facts += [(title, prefix + text) for title, text in hyperfine_lines(lines.hyperfine)]

@@ -226,6 +226,13 @@ def test_channels_without_a_number_hide_no_line_elsewhere(call: Call, folder: Pa
         pick_peaks(rows[20:, 0], np.append(rows[20:-1, 1], np.nan))
 
 
+def test_a_guess_in_another_unit_is_refused(call: Call, peaks_csv: Path) -> None:
+    code, _, error = call("assign", "peaks.csv", "--guess", "9,3,2.4")
+    assert code == 2
+    assert "--guess: A = 9 MHz" in error
+    assert "9,3,2.4GHz" in error
+
+
 def test_overlapping_windows_count_once(folder: Path) -> None:
     rows = in_pieces(((9000.0, 9050.0, 0.1),))
     second = rows[200:] + np.array([0.03, 0.0])

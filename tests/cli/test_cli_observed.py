@@ -197,3 +197,24 @@ def test_mistakes_are_one_line(call, folder, options, rule):
     assert code == 2
     assert rule in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        (
+            lambda f: (f - 230500) / 230500 * -3e5,
+            "which are read in MHz; for velocities give --axis-unit km/s and --rest",
+        ),
+        (
+            lambda f: f * 1e6,
+            "no species has a line from 2.302e+11 to 2.307998e+11 MHz; for a file in Hz give --axis-unit Hz",
+        ),
+    ],
+)
+def test_axes_in_another_unit_are_named(call, folder, column, said):
+    grid, seen = np.loadtxt(folder / "s.txt", unpack=True)
+    np.savetxt(folder / "other.txt", np.stack([column(grid), seen], axis=1))
+    code, _, error = call("identify", str(folder / "other.txt"), "--catalogue", str(folder / "cats"))
+    assert code == 2
+    assert said in error

@@ -405,3 +405,17 @@ def test_influential_lines_are_named_the_worst_first():
     moved = np.abs(dfbetas(fit)).max(axis=1)
     named = [int(text.split(",")[0].removeprefix("line ")) - 1 for text in influential(fit, 0.0)]
     assert named == np.argsort(-moved, kind="stable")[:5].tolist()
+
+
+def test_frequencies_and_errors_in_another_unit_are_said(seen):
+    fit = fit_lines(replace(seen, frequency_mhz=seen.frequency_mhz * 1e3), TRUE, parameters(TRUE, ["A", "B", "C"]))
+    assert (
+        "the lines have 1e+03 times the frequencies of the start; are both in the units that they state?" in fit.notes
+    )
+    error = seen.error_mhz.copy()
+    error[4] = 61700.0  # of 149662,61700 in a .lin, read as a frequency and its error
+    notes = fit_lines(replace(seen, error_mhz=error), TRUE, parameters(TRUE, ["A", "B", "C"])).notes
+    said = [text for text in notes if "is there a comma in a decimal number?" in text]
+    assert len(said) == 1
+    assert said[0].startswith("line 5, ")
+    assert not fit_lines(seen, TRUE, parameters(TRUE, ["A", "B", "C"])).notes

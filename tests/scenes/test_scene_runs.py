@@ -354,3 +354,17 @@ def test_a_scene_writes_every_file_of_its_verb(folder):
     )
     run_scene(read_scene("s.toml"))
     assert len((folder / "heat.csv").read_text().splitlines()) > 2
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("isotopologues", "OCS"),
+        ("emission", "SMILES:CCO", "--band", "ALMA3"),
+        ("spectrum", "SMILES:CCO", "--jmax", "2"),
+    ],
+)
+def test_a_saved_scene_has_the_remarks_of_its_command(call, words):
+    code, _, said = call(*words, "--save-scene", "s.toml")
+    assert (code, "note: " in said) == (0, True)
+    assert call("run", "s.toml")[2] == said

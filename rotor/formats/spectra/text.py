@@ -51,6 +51,11 @@ def read_text_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
     if (axis_unit or "MHz").lower() == "mhz" and frequency.max() < LOW_MHZ:
         low = f"frequencies of {frequency.min():g} to {frequency.max():g} MHz are lower than those of most spectra"
         notes = (*notes, f"{low}; if the numbers are GHz, --axis-unit GHz says so")
+    if axis_unit is None and (numbers[:, 0] <= 0).any():
+        raise ValueError(
+            f"{name}: {numbers[:, 0].min():g} in the first column, that of the frequencies, which are read in MHz; for velocities give "
+            "--axis-unit km/s and --rest"
+        )
     third = numbers.shape[1] > 2 and len(names) > 2 and _NOISE.search(names[2])
     noise = numbers[:, 2] * factor if third else None
     if choices.noise is not None:
