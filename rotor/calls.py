@@ -15,6 +15,7 @@ from typing import Any
 
 from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
+from rotor.requests.field import REQUIRED
 from rotor.requests.fill import Entries
 from rotor.requests.readers import Field
 from rotor.verbs.calculation import Calculation, Outcome
@@ -187,7 +188,11 @@ def _signature(verb: Verb, first: str) -> Signature:
     """The signature of the function, for completion in editors and for `help`."""
     fields = [field for field in _arguments(verb) if field.name != first]
     source = [Parameter(first, Parameter.POSITIONAL_OR_KEYWORD, default=None)] if first else []
-    named = [Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default) for field in fields]
+    defaults = [Parameter.empty if field.default is REQUIRED else field.default for field in fields]
+    named = [
+        Parameter(field.name, Parameter.KEYWORD_ONLY, default=value)
+        for field, value in zip(fields, defaults, strict=True)
+    ]
     return Signature([*source, *named, Parameter("executor", Parameter.KEYWORD_ONLY, default=None)])
 
 

@@ -101,12 +101,14 @@ def checked_momentum(momentum: ArrayLike, moments: Floats) -> Floats:
 
 
 def checked_velocity(omega: ArrayLike, moments: Floats) -> Floats:
-    """Body angular velocity (..., 3), with nothing along an axis whose moment is zero.
+    """Body angular velocity (..., 3), finite, with nothing along an axis whose moment is zero.
 
     >>> checked_velocity([0.0, 1.0, 2.0], np.array([0.0, 3.0, 3.0])).tolist()
     [0.0, 1.0, 2.0]
     """
     array = np.asarray(omega, dtype=np.float64)
+    if not np.all(np.isfinite(array)):
+        raise ValueError("an angular velocity holds a number that is not finite")
     if np.any((moments == 0.0) & (array != 0.0)):
         raise ValueError("a linear rotor does not rotate about its own axis: set that component to 0")
     return array

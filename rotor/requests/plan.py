@@ -76,7 +76,7 @@ class Plan:
     def rows(self, conserved: str = "good quantum numbers") -> list[tuple[str, str]]:
         """The plan as pairs of name and text, without what is left out. conserved: what `good` is called."""
         return [
-            ("effects", "; ".join(self.effects)),
+            *([("effects", "; ".join(self.effects))] if self.effects else []),
             (conserved, ", ".join(self.good) or "none"),
             *self.parts,
             *((name, f"{count:,}") for name, count in self.counts.items()),

@@ -121,7 +121,7 @@ class Equipartition(Table):
         word = "accepted" if self.accepted else "rejected"
         named = f"; failing: {', '.join(self.failing)}" if self.failing else ""
         return (
-            f"equipartition {word} at {100 * self.confidence:g} % confidence: χ² = {self.chi2:.4g} for "
+            f"equipartition {word} at {100 * self.confidence:g} % confidence, p = {self.p_value:.3g}: χ² = {self.chi2:.4g} for "
             f"{self.chi2_degrees} degrees (p = {self.chi2_p:.3g}), distributions p = {self.ks_p:.3g}; farthest "
             f"{worst.name}, {worst.sigma:+.2f} σ{named}"
         )

@@ -160,8 +160,8 @@ def _refuse_other_model(source: str, settings: Settings) -> None:
         raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
         raise ValueError(
-            f"{source!r}: a box is made of one model, whose name stands twice: 'rotor fluid trappe-n2 --model trappe-n2'; "
-            f"models are {', '.join(sorted(MODELS))}"
+            f"{source!r}: a new box is of a single model, or of 'water'; models are {', '.join(sorted(MODELS))}, "
+            "written as in 'rotor fluid argon --model argon'"
         )
     model = find_model(settings.model)
     if source == "water" and model.symbols != ("O", "H", "H"):

@@ -46,7 +46,7 @@ def _numbers(raw: Any, count: int, expected: str, unit: str = "") -> list[float]
         raise ValueError(f"{raw!r}: expected {expected}")
     values = [float(number) for number in (parse_grid(raw, unit) if isinstance(raw, str) else raw)]
     if len(values) != count:
-        raise ValueError(f"{values}: expected {expected}")
+        raise ValueError(f"{raw!r}: expected {expected}")
     return values
 
 

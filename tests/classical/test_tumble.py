@@ -434,3 +434,11 @@ def test_a_driven_motion_names_its_method_in_words(call):
     assert code == 0, err
     assert "Runge-Kutta of order 8, adaptive, tolerance 1e-10 of a step" in out
     assert "the effects change it" in out
+
+
+def test_a_velocity_beyond_doubles_is_refused_by_its_option(call):
+    code, out, err = call("tumble", "water", "--omega", "1e400,1,1")
+    assert (code, out) == (2, "")
+    assert err == "error: --omega: '1e400,1,1': an angular velocity holds a number that is not finite\n"
+    with pytest.raises(ValueError, match=r"^angular_velocity: \[1, 2\]: expected three numbers"):
+        rotor.tumble("water", angular_velocity=[1, 2])

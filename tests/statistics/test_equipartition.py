@@ -252,7 +252,7 @@ def test_wrong_species_and_nothing_at_all():
 def test_the_table_and_the_sentence():
     test = equipartition(gas_of("water", 1000).kinetic, KT)
     assert list(test.to_pandas()["name"]) == [degree.name for degree in test.degrees]
-    assert str(test).startswith("equipartition accepted at 99 % confidence: χ² = ")
+    assert str(test).startswith("equipartition accepted at 99 % confidence, p = ")
 
 
 def test_energies_that_follow_the_law_too_well_have_an_answer():

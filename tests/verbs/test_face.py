@@ -208,6 +208,12 @@ def test_a_command_without_a_function_names_the_building_block():
         rotor.identify  # noqa: B018
 
 
+def test_what_must_be_given_has_no_default_in_the_signature():
+    signature = inspect.signature(rotor.align)
+    assert signature.parameters["pulses"].default is inspect.Parameter.empty
+    assert "MISSING" not in str(signature)
+
+
 def test_a_pulse_as_a_line_says_how_it_is_written():
     with pytest.raises(ValueError, match=r"no shape is named .*; there are gaussian, .* \(a name, then key=value\)"):
         rotor.align("OCS", pulses=["1e13 W/cm2, 1 ps"])

@@ -128,7 +128,8 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
             if any(_same_conformer(shape, other) for other in shapes):
                 continue
         molecule = from_rdkit(mol, conformer=place, name=text)
-        source = f"SMILES {text}: {field} geometry, of {counted(len(energies), 'conformer')}" if field else "one atom"
+        named = text if text.startswith("InChI=") else f"SMILES {text}"
+        source = f"{named}: {field} geometry, of {counted(len(energies), 'conformer')}" if field else "one atom"
         conformer = Conformer(
             replace(molecule, source=source, uncertainty=typical, notes=(*doubts, *molecule.notes)), energy
         )

@@ -19,6 +19,7 @@ from rotor.units import DEBYE_PER_E_ANGSTROM
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+_STATED = re.compile(r"\b(charge|multiplicity)\s*=\s*([+-]?\d+)(?![\w.])")
 _NUMBERED = re.compile(r"[A-Za-z]{1,2}-?\d+")
 _MINUS_SIGNS = str.maketrans("\u2212\u2013\u2012", "---")  # minus sign, en dash, figure dash
 _ENCODINGS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
@@ -50,7 +51,8 @@ def parse_xyz(text: str, where: str = "xyz text") -> Molecule:
     ----------
     text : str
         Number of atoms; a comment; a line per atom: symbol, isotope or atomic number, then x y z in Å. A comment with `Properties=`
-        makes it extended xyz, from which `dipole` (e Å, as written by ASE), `charge` and the column `masses` are read too.
+        makes it extended xyz, from which `dipole` (e Å, as written by ASE) and the column `masses` are read too; `charge` and
+        `multiplicity` (charge=1) are read from any comment.
     where : str
         File name for messages.
 
@@ -124,9 +126,9 @@ def _refuse_cut_number(rows: list[tuple[int, list[str]]], columns: _Columns, whe
 
 
 def _extended(comment: str, where: str) -> tuple[dict[str, Any], _Columns]:
-    """Key-value pairs and columns of an extended xyz comment; for other comments no pairs and the plain columns."""
+    """Key-value pairs and columns of an extended xyz comment; for other comments charge and multiplicity and the plain columns."""
     if not re.search(r"\b(Properties|Lattice)=", comment):
-        return {}, _Columns()
+        return {name: int(number) for name, number in _STATED.findall(comment)}, _Columns()
     from ase.io import extxyz
 
     read_pairs: Callable[[str], dict[str, Any]] = extxyz.key_val_str_to_dict
@@ -165,9 +167,10 @@ def _molecule(
             mass_numbers=tuple(nucleus.mass_number for nucleus in nuclei),
             positions_angstrom=np.array(positions),
             charge=info.get("charge", 0),
+            multiplicity=info.get("multiplicity"),
             dipole_debye=None if dipole is None else np.asarray(dipole, dtype=float) * DEBYE_PER_E_ANGSTROM,
             dipole_source="" if dipole is None else f"{where} (e Å, as ASE writes it)",
-            source=f"{where}, which says {comment!r}" if comment and not info else where,
+            source=f"{where}, which says {comment!r}" if comment and "Properties" not in info else where,
             notes=_notes(rows, columns, info),
         )
     except ValueError as reason:

@@ -109,6 +109,21 @@ def test_columns_that_are_not_read_are_told():
     assert molecule.notes == ("columns after x y z were not read",)
 
 
+@pytest.mark.parametrize(
+    ("comment", "charge", "multiplicity"),
+    [("charge=1 multiplicity=2", 1, 2), ("cation, charge = +1", 1, None), ("Properties=species:S:1:pos:R:3 charge=1 multiplicity=4", 1, 4),
+     ("charge=0.5", 0, None), ("a charge of 1", 0, None), ("multiplicity=3", 0, 3)],
+)  # fmt: skip
+def test_charge_and_multiplicity_of_any_comment(comment, charge, multiplicity):
+    molecule = parse_xyz(f"3\n{comment}\nO 0 0 0.117\nH 0 0.757 -0.47\nH 0 -0.757 -0.47\n")
+    assert (molecule.charge, molecule.multiplicity) == (charge, multiplicity)
+
+
+def test_an_impossible_multiplicity_is_refused():
+    with pytest.raises(ValueError, match="multiplicity 2: with an even number of electrons"):
+        parse_xyz("3\nmultiplicity=2\nO 0 0 0.117\nH 0 0.757 -0.47\nH 0 -0.757 -0.47\n")
+
+
 def test_extended_xyz_as_ase_writes_it(tmp_path):
     import ase.io
     from ase.calculators.singlepoint import SinglePointCalculator
