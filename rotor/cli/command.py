@@ -111,16 +111,19 @@ def molecules_and_files(incomplete: str) -> list[str]:
     return sorted(text for name, text in known.items() if name.startswith(incomplete.casefold())) + sorted(files)
 
 
-class VerbCommand(typer.core.TyperCommand):
-    """A command whose help has panels: the options that most people use first, all of them by --help-all.
-
-    Texts are left unconverted; readers of declared fields make numbers of them. Typer's own conversion loads pydantic, which takes as
-    long as numpy.
-    """
+class _TextsUnconverted:
+    """A command or group whose texts are left unconverted: typer's own conversion loads pydantic, which takes as long as numpy."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, --help among them."""
-        return [_unconverted(parameter) for parameter in super().get_params(ctx)]
+        return [_unconverted(parameter) for parameter in super().get_params(ctx)]  # type: ignore[misc]
+
+
+class VerbCommand(_TextsUnconverted, typer.core.TyperCommand):
+    """A command whose help has panels: the options that most people use first, all of them by --help-all.
+
+    Readers of declared fields make numbers of its texts.
+    """
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments and options, panel by panel."""
@@ -139,12 +142,8 @@ class VerbCommand(typer.core.TyperCommand):
                     formatter.write_dl(panels[panel])
 
 
-class PlainGroup(typer.core.TyperGroup):
-    """A group of commands that leaves texts unconverted."""
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """The parameters, --help among them."""
-        return [_unconverted(parameter) for parameter in super().get_params(ctx)]
+class PlainGroup(_TextsUnconverted, typer.core.TyperGroup):
+    """The group of all commands."""
 
 
 def _unconverted(parameter: Any) -> Any:

@@ -180,7 +180,9 @@ class Outcome:
         """A function that writes an output, by the output's own function or as a table."""
         if (by_function := output.write) is not None:
             return lambda path: by_function(self.answer, path, self.report)
-        return lambda path: self.write_table((output.of or self.verb.table)(self.answer), path)
+        if (table_of := output.of) is not None:
+            return lambda path: self.write_table(table_of(self.answer, self.report), path)
+        return lambda path: self.write_table(self.table, path)
 
     def write_table(self, table: Table, path: Path) -> None:
         """Write a table in the format of the suffix, with its provenance."""

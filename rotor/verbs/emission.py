@@ -283,7 +283,9 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the lines", "lines"),
-        table_file("profile_csv", "T_B and optical depth on the grid", "profile.csv", lambda answer: answer.spectrum),
+        table_file(
+            "profile_csv", "T_B and optical depth on the grid", "profile.csv", lambda answer, _: answer.spectrum
+        ),
         picture("Draw T_B of all molecules", "emission.png"),
     ),
     subject=SeveralMolecules(),

@@ -291,7 +291,7 @@ def draw(answer: Observed, path: Path, report: Report) -> None:
     plot_overlay(answer.spectrum, answer.components, path, sight=answer.sight, provenance=report.command)
 
 
-def profile(answer: Observed) -> Columns:
+def profile(answer: Observed, _: Report) -> Columns:
     """Observed and modelled brightness."""
     from rotor.observed.overlay_table import overlay_table
 

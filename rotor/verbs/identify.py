@@ -13,8 +13,9 @@ from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
+from rotor.spectra.emission import BACKGROUND_K
 from rotor.table import counted
-from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
+from rotor.verbs.observed_file import SpectrumFile, json_of, layer_field, padded, spectrum_facts
 from rotor.verbs.outputs import PICTURES, Output, Report, table_file
 from rotor.verbs.verb import ErrorsShown, Tool, Work
 
@@ -46,10 +47,8 @@ class IdentifyRequest:
     fwhm_km_s: float | None = source_field(
         None, Quantity("km/s", metavar="W"), "Full width of the lines (km/s); by default estimated", option="--width"
     )
-    background_k: float = source_field(
-        2.725, Quantity("K", metavar="T"), "Temperature behind the source (K)", option="--background"
-    )
-    redshift: float = source_field(0.0, Quantity(metavar="Z"), "Redshift of the source")
+    background_k: float = layer_field("background_k", BACKGROUND_K)
+    redshift: float = layer_field("redshift", 0.0)
     model_error: float = declared(0.1, Quantity(least=0, most=1), "Error of the model as a fraction of the brightness")
     most: int = declared(60, Whole(1), "Largest number of species")
     spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())

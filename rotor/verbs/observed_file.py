@@ -204,10 +204,10 @@ SINGLE_FIT = Rule(("fit",), SINGLE.excludes, "belongs to a fit of a single spect
 FIT_OPTIONS = ("free", "shared", "sample", "calibration", "reject")
 
 
-def layer_field(name: str) -> Any:
-    """A field of the emitting gas, None if not typed: a fit then estimates it."""
+def layer_field(name: str, default: Any = None) -> Any:
+    """A field of the emitting gas with another default; None if not typed: a fit then estimates it."""
     field = declared_fields(LayerInput)[name]
-    return declared(None, field.reader, field.help, field.key, option=field.option, panel=field.panel)
+    return declared(default, field.reader, field.help, field.key, option=field.option, panel=field.panel)
 
 
 @dataclass(frozen=True)

@@ -62,8 +62,8 @@ class Output:
     """A file that a verb writes.
 
     name: of the option, and of the key in [outputs]. write: by default writes the table in the format of the suffix.
-    of: returns the written table if it is not that of the verb. grows: written during the calculation. many: repeatable.
-    scene: whether scenes have it too. required: whether the verb exists to write this file. rule: as of a field.
+    of: returns the written table, from the answer and its report, if it is not that of the verb. grows: written during the calculation.
+    many: repeatable. scene: whether scenes have it too. required: whether the verb exists to write this file. rule: as of a field.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Output:
     help: str
     write: Writer | None = None
     example: str = ""
-    of: Callable[[Any], Any] | None = None
+    of: Callable[[Any, Report], Any] | None = None
     option: str = ""
     grows: bool = False
     many: bool = False
@@ -164,7 +164,9 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def table_file(name: str, what: str, example: str = "", of: Callable[[Any], Any] | None = None, **more: Any) -> Output:
+def table_file(
+    name: str, what: str, example: str = "", of: Callable[[Any, Report], Any] | None = None, **more: Any
+) -> Output:
     """Output for a table in the format that ends its name, such as csv, parquet or profile_csv."""
     kind = name.rpartition("_")[2]
     help_ = f"Write {what} as {'CSV' if kind == 'csv' else kind.title()}"

@@ -321,7 +321,7 @@ VERB = Verb(
             scene=False,
         ),
         *tables("all lines", "lines", write=write_table),
-        table_file("profile_csv", "the profile on its grid", "profile.csv", lambda answer: answer.spectrum),
+        table_file("profile_csv", "the profile on its grid", "profile.csv", lambda answer, _: answer.spectrum),
         picture("Draw the spectrum", "lines.png", draw),
         Output(
             "loomis_wood",

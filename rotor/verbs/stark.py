@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,14 +56,7 @@ def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
 
 def _further(name: str, what: str) -> Output:
     """File of a table derived from the map."""
-
-    def write_table(answer: StarkAnswer, path: Path, report: Report) -> None:
-        """Write the table."""
-        from rotor.formats import write
-
-        write(_derived_table(name, answer, report), path, settings=dict(report.provenance))
-
-    return Output(name, (".csv",), f"Write {what} as CSV", write_table, scene=False)
+    return Output(name, (".csv",), f"Write {what} as CSV", of=partial(_derived_table, name), scene=False)
 
 
 def _derived_table(name: str, answer: StarkAnswer, report: Report) -> Any:

@@ -141,8 +141,8 @@ VERB = Verb(
     show=top_facts.report_on_top(_facts, _level_table, _thermo_table, _classical_facts),
     outputs=(
         table_file("csv", "the levels", "levels.csv"),
-        table_file("thermo_csv", "the thermodynamic functions of all methods", "thermo.csv", lambda answer: answer.functions),
-        table_file("classical_csv", "the classical gas against time", "gas.csv", lambda answer: answer.classical,
+        table_file("thermo_csv", "the thermodynamic functions of all methods", "thermo.csv", lambda answer, _: answer.functions),
+        table_file("classical_csv", "the classical gas against time", "gas.csv", lambda answer, _: answer.classical,
                    rule=Rule(("observables.classical",), why="a classical gas has a temperature, such as 300K")),
         picture("Draw potential, levels and wave functions", "torsion.png"),
     ),
