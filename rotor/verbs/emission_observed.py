@@ -342,6 +342,7 @@ _MODEL = {
     "v (km/s)": "{0.velocity_km_s:.3f}",
     "Δv (km/s)": "{0.fwhm_km_s:.3f}",
 }
+POOR = 4.0  # χ²/ν beyond which residuals are twice the noise
 _DIAGRAMS = {
     "species": "{species}",
     "lines": "{lines}",
@@ -360,6 +361,8 @@ _NEEDED = {
 
 def _fit_parts(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> Iterable[Part | None]:
     chi = f"{fit.reduced_chi_squared:.4g}, {fit.degrees_of_freedom} degrees of freedom"
+    if fit.reduced_chi_squared > POOR:
+        chi += "; the model does not describe the spectrum: other species, or another start (--reject, --velocity, --width)"
     yield [("fit", fit.minimum.reason), ("χ²/ν", chi)]
     yield _parameter_table(fit)
     yield record_table("what each species contributes", _NEEDED, needed, LEFT)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
+from rotor.units import parse_quantity
 from rotor.viewer.assets import MISSING, bokeh_js, page_file
 from rotor.viewer.opening import open_session
 from rotor.viewer.service import Service
@@ -18,9 +19,9 @@ def view(
     *,
     lines: str | None = None,
     session: str | os.PathLike[str] | None = None,
-    temperature_k: float = 300.0,
+    temperature_k: float | str = 300.0,
     axis_unit: str | None = None,
-    rest_mhz: float | None = None,
+    rest_mhz: float | str | None = None,
     unit: str | None = None,
     noise: float | None = None,
     save: bool = True,
@@ -38,11 +39,11 @@ def view(
         Assigned lines (.lin, .csv, .cat) of the first molecule.
     session : path, optional
         The session file; by default SPECTRUM.view.json beside the spectrum.
-    temperature_k : float, optional
+    temperature_k : float or str, optional
         Of the added species.
     axis_unit, unit : str, optional
         What the file of the spectrum does not state, such as "GHz" and "mK".
-    rest_mhz : float, optional
+    rest_mhz : float or str, optional
         Rest frequency of a velocity axis.
     noise : float, optional
         Of a channel.
@@ -63,9 +64,10 @@ def view(
     """
     names = [molecules] if isinstance(molecules, str) else list(molecules)
     remarks: list[str] = []
+    kelvin, rest = parse_quantity(temperature_k, "K"), None if rest_mhz is None else parse_quantity(rest_mhz, "MHz")
     service = open_session(
-        source, names, lines=lines, session=session, temperature_k=temperature_k, axis_unit=axis_unit,
-        rest_mhz=rest_mhz, unit=unit, noise=noise, save=save, note=remarks.append,
+        source, names, lines=lines, session=session, temperature_k=kelvin, axis_unit=axis_unit, rest_mhz=rest, unit=unit,
+        noise=noise, save=save, note=remarks.append,
     )  # fmt: skip
     service.session.warnings += tuple(text for text in remarks if text not in service.session.warnings)
     return widget_class()(service, height)

@@ -697,12 +697,13 @@ def test_the_widget_answers_messages_and_announces_changes(service):
     service.session.release()
     import rotor
 
-    widget = rotor.view("spectrum.csv", NAME, temperature_k=KELVIN)
+    widget = rotor.view("spectrum.csv", NAME, temperature_k=f"{1e3 * KELVIN} mK")
     sent = []
     widget.send = sent.append
     widget._received(widget, {"do": "hello", "id": 3}, None)
     assert sent[0]["re"] == 3
     assert sent[0]["ok"]["session"]["records"]["species/1"]["name"] == "case"
+    assert sent[0]["ok"]["session"]["records"]["species/1"]["temperature_k"] == pytest.approx(KELVIN)
     widget._received(widget, {"do": "species", "species": 1, "scale": 2.0, "id": 4}, None)
     assert [*sent[1]] == ["session"]
     assert sent[2]["re"] == 4

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -81,8 +82,15 @@ def catdir_beside(path: Path) -> dict[int, CatdirEntry]:
     entries: dict[int, CatdirEntry] = {}
     for folder in (path.resolve().parent.parent, path.resolve().parent):
         for file in sorted(folder.glob("catdir*.cat")):
-            entries |= read_catdir(file)
+            stat = file.stat()
+            entries |= _read_once(file, stat.st_mtime_ns, stat.st_size)
     return entries
+
+
+@lru_cache(maxsize=8)
+def _read_once(file: Path, modified_ns: int, size: int) -> dict[int, CatdirEntry]:
+    """The species of an unchanged file, which stands beside many catalogues."""
+    return read_catdir(file)
 
 
 def is_catdir(path: Path) -> bool:
