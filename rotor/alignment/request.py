@@ -114,23 +114,23 @@ class AlignRequest:
         None, Quantity("ps", metavar="T"), "Last time (ps); by default 1.1 revivals after the pulses, or 100 ps", "conditions.last_time",
         option="--until", common=True, example="100 ps",
     )  # fmt: skip
-    points: int = declared(DEFAULT_POINTS, Whole(2, MOST_POINTS), "How many times", "conditions.points")
+    points: int = declared(DEFAULT_POINTS, Whole(2, MOST_POINTS), "Number of times", "conditions.points")
     observables: tuple[str, ...] = declared(
         ("cos2theta",), Names(), "cos2theta, costheta, cos2theta_2d, cos2_aZ, cos_bX, ...; repeatable", "observables.cosines",
         option="--observable", common=True, example=["cos2theta"],
     )  # fmt: skip
     tolerance: float = declared(
-        DEFAULT_TOLERANCE, Quantity(above=1e-12, below=0.1), "Of the cosines: steps, J max and populations follow from it",
+        DEFAULT_TOLERANCE, Quantity(above=1e-12, below=0.1), "Error of the cosines: steps, J max and populations follow from it",
         "numerics.tolerance", knob=TOLERANCE,
     )  # fmt: skip
     jmax: int | None = declared(
         None, Whole(2), "Highest J of the basis; by default what the tolerance needs", "numerics.jmax", example=30
     )
     classical_molecules: int = declared(
-        0, Whole(0), "Also a classical gas of so many molecules under the same pulses", "observables.classical_molecules",
+        0, Whole(0), "Also a classical gas of this many molecules under the same pulses", "observables.classical_molecules",
         option="--classical",
     )  # fmt: skip
-    seed: int = declared(1, Whole(0), "Of the classical gas", "numerics.seed")
+    seed: int = declared(1, Whole(0), "Seed of the classical gas", "numerics.seed")
 
     def __post_init__(self) -> None:
         from rotor.alignment.acting import acted_on

@@ -38,11 +38,11 @@ class AssignRequest:
 
     peaks: PeakList
     molecule: Molecule | None = field(default=None, repr=False)
-    species: int = declared(1, Whole(1, 20), "How many species to look for", "observables.species", common=True)
+    species: int = declared(1, Whole(1, 20), "Number of species to look for", "observables.species", common=True)
     temperature_k: float | None = declared(
         None,
         Quantity("K", above=0, metavar="T"),
-        "Temperature of the gas (K); by default it is found",
+        "Temperature of the gas (K); by default estimated",
         "conditions.temperature",
         common=True,
         example=2.0,
@@ -71,7 +71,7 @@ class AssignRequest:
         common=True,
     )
     seconds: float = declared(
-        20.0, Quantity("s", above=0, metavar="T"), "End the search after so many seconds", "numerics.seconds"
+        20.0, Quantity("s", above=0, metavar="T"), "End the search after this many seconds", "numerics.seconds"
     )
     seed: int = declared(1, Whole(0), "Seed of the sample of tops", "numerics.seed")
 

@@ -67,7 +67,7 @@ class FluidRequest:
     engine: str = declared(
         "rotor",
         Text(("rotor", *ENGINES), "NAME"),
-        "Which engine runs it: rotor, openmm or lammps",
+        "Engine of the run: rotor, openmm or lammps",
         "numerics.engine",
         common=True,
     )

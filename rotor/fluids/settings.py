@@ -48,26 +48,26 @@ class Settings:
     temperature_k: float = declared(
         298.15,
         Quantity("K", above=0, metavar="T"),
-        "Of thermostat and starting velocities (K)",
+        "Temperature of the thermostat and of the initial velocities (K)",
         "conditions.temperature",
         common=True,
     )
     step_fs: float = declared(
         2.0, Quantity("fs", above=0, most=LARGEST, metavar="T"), "Length of a step (fs)", "numerics.step", common=True
     )
-    steps: int = declared(1000, Whole(0), "How many steps", "conditions.steps", common=True)
+    steps: int = declared(1000, Whole(0), "Number of steps", "conditions.steps", common=True)
     every: int = declared(10, Whole(1), "Steps between rows", "conditions.every", common=True)
     cutoff_angstrom: float = declared(
         9.0,
         Quantity("Å", above=0, most=LARGEST, metavar="R"),
-        "Of Lennard-Jones and of charges in real space (Å)",
+        "Cutoff of Lennard-Jones and of real-space Coulomb forces (Å)",
         "numerics.cutoff",
     )
     electrostatics: str = declared(
         "reaction-field", Text(ELECTROSTATICS, "NAME"), "reaction-field, ewald or shifted", "numerics.electrostatics"
     )
     friction_per_ps: float = declared(
-        1.0, Quantity("1/ps", above=0, most=LARGEST, metavar="F"), "Of langevin (1/ps)", "conditions.friction"
+        1.0, Quantity("1/ps", above=0, most=LARGEST, metavar="F"), "Friction of langevin (1/ps)", "conditions.friction"
     )
     relaxation_fs: float = declared(
         100.0,
@@ -75,9 +75,12 @@ class Settings:
         "Time constant of nose-hoover (fs)",
         "conditions.relaxation",
     )
-    seed: int = declared(1, Whole(0), "Of the lattice, the velocities and the noise", "numerics.seed")
+    seed: int = declared(1, Whole(0), "Seed of the lattice, the velocities and the noise", "numerics.seed")
     ewald_tolerance: float = declared(
-        1e-5, Quantity(above=1e-14, below=1), "Of forces by ewald, relative to e²/4πε0 Å²", "numerics.ewald_tolerance"
+        1e-5,
+        Quantity(above=1e-14, below=1),
+        "Error of forces by ewald, relative to e²/4πε0 Å²",
+        "numerics.ewald_tolerance",
     )
 
     def __post_init__(self) -> None:

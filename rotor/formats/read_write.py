@@ -104,12 +104,15 @@ def _meaning(word: str) -> Path | str:
             raise ValueError(f"{word!r} is no file and no name of a molecule; did you mean 'SMILES:{word}'?")
         import difflib
 
-        from rotor.formats.molecules.library import names
+        from rotor.formats.molecules.library import count_atoms, names
 
         known = dict.fromkeys([*names(), *_g2_names()])
         typed = word.casefold().replace("0", "o")  # a zero for the letter O, another case
         alike = [name for name in known if name.casefold() == typed]
-        near = dict.fromkeys([*alike, *difflib.get_close_matches(word, known, n=3)])
+        is_formula, atoms = _FORMULA.fullmatch(word), count_atoms(word)
+        alike += [name for name in known if is_formula and _FORMULA.fullmatch(name) and count_atoms(name) == atoms]
+        alike += [_OF_G2[name] for name in (re.sub("[-_]", " ", typed),) if name in _OF_G2]
+        near = dict.fromkeys(alike or difflib.get_close_matches(word, known, n=3))
         meant = f"did you mean {', '.join(list(near)[:3])}? " if near else ""
         meant = next((f"did you mean {hint}? " for hint in _isotopologues(word, known)), meant)
         raise ValueError(
@@ -119,6 +122,13 @@ def _meaning(word: str) -> Path | str:
     return library_path or word
 
 
+_FORMULA = re.compile(r"(?:[A-Z][a-z]?\d*)+")
+_OF_G2 = {
+    "acetaldehyde": "CH3CHO", "acetamide": "CH3CONH2", "acetic acid": "CH3COOH", "acetone": "CH3COCH3", "allene": "C3H4_D2d",
+    "butane": "trans-butane", "cyclopropane": "C3H6_D3h", "dimethyl ether": "CH3OCH3", "ethane": "C2H6", "ethanol": "CH3CH2OH",
+    "hydrazine": "N2H4", "methanol": "CH3OH", "methylamine": "H3CNH2", "propane": "C3H8", "pyrrole": "C4H4NH", "silane": "SiH4",
+    "thiophene": "C4H4S",
+}  # fmt: skip  # molecules that the set has by their formulas
 _ISOTOPE = re.compile(r"D(?![a-z])|(1[358]|17|3[346]|37|81)(C|N|O|S|Cl|Br)(?![a-z])")
 
 

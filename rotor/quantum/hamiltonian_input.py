@@ -35,7 +35,7 @@ class HamiltonianInput:
         "effects.hyperfine_method",
     )  # fmt: skip
     hyperfine_tolerance: float = declared(
-        1e-4, Quantity("MHz", above=0, metavar="D"), "With auto: how far it may be off exact levels (MHz)",
+        1e-4, Quantity("MHz", above=0, metavar="D"), "With auto: allowed deviation from the exact levels (MHz)",
         "effects.hyperfine_tolerance", typed="0.1 kHz",
     )  # fmt: skip
 

@@ -98,7 +98,7 @@ class ThermoRequest:
     relative_error: float = declared(
         1e-6,
         Quantity(above=0),
-        "Of Q, U and C_v: the levels left out of the sums",
+        "Relative error of Q, U and C_v from the levels left out of the sums",
         "numerics.relative_error",
         knob=LEFT_OUT,
     )

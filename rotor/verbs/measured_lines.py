@@ -109,7 +109,7 @@ class FitInput:
     )
     poor_rms: float = declared(10.0, Quantity(), "Weighted rms above which the fit has failed", "numerics.poor_rms")
     most_iterations: int | None = declared(
-        None, Whole(1), "Most iterations; 100, or NITR of a .par file", "numerics.iterations", example=100
+        None, Whole(1), "Maximum number of iterations; 100, or NITR of a .par file", "numerics.iterations", example=100
     )
 
 

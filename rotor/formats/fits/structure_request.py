@@ -39,7 +39,11 @@ class StructureRequest:
 
     file: FamilyFile
     methods: tuple[str, ...] = declared(
-        ("rs", "r0"), NameList(METHODS), "Of rs, r0, rm1, rm2, re", "observables.method", common=True
+        ("rs", "r0"),
+        NameList(METHODS),
+        "Kinds of structure, among rs, r0, rm1, rm2, re",
+        "observables.method",
+        common=True,
     )
     weights: str = declared(
         "equal", Text(metavar="NAME"), "Moments weighted equally, or by their errors (errors)", "numerics.weights"
@@ -53,7 +57,7 @@ class StructureRequest:
         example="c",
     )
     pair: str = declared(
-        "ab", Text(metavar="AB"), "Which two moments serve for rs of a planar molecule: ab, ac, bc", "numerics.pair"
+        "ab", Text(metavar="AB"), "Pair of moments used for rs of a planar molecule: ab, ac, bc", "numerics.pair"
     )
     check: bool = declared(
         False,

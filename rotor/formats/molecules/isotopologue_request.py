@@ -31,7 +31,7 @@ class IsotopologuesRequest:
 
     top: Top
     min_abundance: float | None = declared(
-        None, Quantity("fraction", metavar="X"), "Least abundance in nature of those listed; 0.0001 unless others are named",
+        None, Quantity("fraction", metavar="X"), "Minimum natural abundance of those listed; 0.0001 unless others are named",
         "observables.min_abundance", common=True, example=0.01,
     )  # fmt: skip
     each: tuple[str, ...] = declared(

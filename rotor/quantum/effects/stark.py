@@ -223,7 +223,7 @@ class StarkRequest:
         "observables.m", common=True, example=[0, 1],
     )  # fmt: skip
     intensity_w_per_cm2: float = declared(
-        0.0, INTENSITY, "Of a laser along Z, far from resonance (W/cm2)", "conditions.intensity"
+        0.0, INTENSITY, "Intensity of a laser along Z, far from resonance (W/cm2)", "conditions.intensity"
     )
     direction: tuple[float, float, float] = declared(
         Z, Custom(read_direction, list, "ANGLE", list[float] | float | str),

@@ -118,7 +118,7 @@ def tolerance_field(default_mhz: float, typed: str) -> Any:
     return declared(
         default_mhz,
         Quantity("MHz", above=0, metavar="E"),
-        "Of the energies (MHz)",
+        "Error of the energies (MHz)",
         "numerics.tolerance",
         typed=typed,
         knob=TOLERANCE,

@@ -50,16 +50,18 @@ class GasRequest:
     """
 
     top: Top
-    molecules: int = declared(20_000, Whole(2, MOST_MOLECULES), "How many are drawn", "numerics.molecules", common=True)
+    molecules: int = declared(
+        20_000, Whole(2, MOST_MOLECULES), "Number of molecules drawn", "numerics.molecules", common=True
+    )
     temperature_k: float = declared(
         300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True
     )
     seed: int = declared(1, Whole(0), "Seed of the random numbers", "numerics.seed")
     confidence: float = declared(
-        0.99, Quantity(above=0, below=1), "Of the test of equipartition", "observables.confidence"
+        0.99, Quantity(above=0, below=1), "Confidence level of the test of equipartition", "observables.confidence"
     )
     times_ps: tuple[float, ...] | None = declared(
-        None, Grid("ps", most_points=MOST_TIMES), "Of the correlation functions: start:stop:count or a comma list (ps)",
+        None, Grid("ps", most_points=MOST_TIMES), "Times of the correlation functions: start:stop:count or a comma list (ps)",
         "observables.times", common=True, example="0:2:201",
     )  # fmt: skip
 

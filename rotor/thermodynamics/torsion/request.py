@@ -73,7 +73,7 @@ class TorsionRequest:
 
     top: Top
     bond: str = declared(
-        "", Text(metavar="I-J"), "The bond: atoms I-J as counted from 1; what stands behind J turns", "observables.bond",
+        "", Text(metavar="I-J"), "Bond between atoms I-J, counted from 1; the group behind J turns", "observables.bond",
         common=True, example="1-2",
     )  # fmt: skip
     potential: Any = declared(
@@ -81,7 +81,9 @@ class TorsionRequest:
         "'V3=400 V6=-10 cm-1', 'table' (V3 of a similar molecule), or a relaxed scan: mmff or an ASE calculator", "observables.potential",
         common=True, example="V3=400 cm-1",
     )  # fmt: skip
-    points: int = declared(POINTS, Whole(6, 720), "Angles of a scan, in a whole turn", "numerics.points", knob=ANGLES)
+    points: int = declared(
+        POINTS, Whole(6, 720), "Number of angles of a scan, in a whole turn", "numerics.points", knob=ANGLES
+    )
     vmax: int = declared(
         3,
         Whole(0, 200),
@@ -99,7 +101,7 @@ class TorsionRequest:
         example="300 K",
     )  # fmt: skip
     duration_ps: float = declared(
-        10.0, Quantity("ps", above=0), "How long the classical gas is followed (ps)", "numerics.duration"
+        10.0, Quantity("ps", above=0), "Duration of the classical motion (ps)", "numerics.duration"
     )
     molecules: int = declared(300, Whole(2, 100_000), "Molecules of the classical gas", "numerics.molecules")
     seed: int = declared(1, Whole(0), "Seed of the classical gas", "numerics.seed")
