@@ -15,11 +15,30 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 from numba import njit
+from numba.core import event
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 PACKAGE = __name__.partition(".")[0]
 IMPORT = re.compile(rf"^(?:from ({PACKAGE}[.\w]*) import (\([^)]*\)|.*)|import ({PACKAGE}[.\w]*))", re.MULTILINE)
+
+
+class Compilations(event.Listener):
+    """Count of the compilations that are running, for displays of progress."""
+
+    running = 0
+
+    def on_start(self, event: Any) -> None:
+        """Count a compilation, or one within it."""
+        self.running += 1
+
+    def on_end(self, event: Any) -> None:
+        """Count its end."""
+        self.running -= 1
+
+
+compilations = Compilations()
+event.register("numba:compile", compilations)  # type: ignore[no-untyped-call]
 
 
 def kernel(**options: Any) -> Callable[[Function], Function]:

@@ -20,7 +20,10 @@ class _Display:
 
 @contextmanager
 def elapsed_time(what: str) -> Iterator[None]:
-    """Show the elapsed time of work that takes longer than two seconds, unless a bar or a progress line is shown already."""
+    """Show the elapsed time of work that takes longer than two seconds, unless a bar or a progress line is shown already.
+
+    While kernels are compiled, the line says so.
+    """
     if not sys.stderr.isatty():
         yield
         return
@@ -32,7 +35,8 @@ def elapsed_time(what: str) -> Iterator[None]:
         while not ended.wait(pause):
             pause = min(1.0, SHOW_AFTER_S)
             if not _Display.bars and time.monotonic() - _Display.last_line > SHOW_AFTER_S:
-                print(f"\r{what}: {time.monotonic() - start:.0f} s ", end="", file=sys.stderr, flush=True)
+                text = "compiling, at the first use only" if _is_compiling() else what
+                print(f"\r{text}: {time.monotonic() - start:.0f} s \x1b[K", end="", file=sys.stderr, flush=True)
                 written.set()
 
     thread = threading.Thread(target=show, daemon=True)
@@ -44,6 +48,12 @@ def elapsed_time(what: str) -> Iterator[None]:
         thread.join()
         if written.is_set():
             print("\r\x1b[2K", end="", file=sys.stderr, flush=True)  # clear the line
+
+
+def _is_compiling() -> bool:
+    """Whether a kernel is being compiled; the compiler is not loaded for the question."""
+    kernels = sys.modules.get("rotor.kernels")
+    return kernels is not None and kernels.compilations.running > 0
 
 
 @contextmanager

@@ -38,6 +38,21 @@ def test_long_work_shows_its_time_and_leaves_an_empty_line(monkeypatch):
     assert terminal.getvalue().endswith("\r\x1b[2K")
 
 
+def test_the_line_says_when_kernels_are_compiled(monkeypatch):
+    from numba.core import event
+
+    import rotor.kernels  # noqa: F401  # counts compilations
+
+    terminal = on_terminal(monkeypatch)
+    with elapsed_time("computing"):
+        with event.trigger_event("numba:compile", data={}):
+            time.sleep(0.3)
+        assert re.match(r"\rcompiling, at the first use only: 0 s ", terminal.getvalue())
+        assert "computing" not in terminal.getvalue()
+        time.sleep(0.3)
+    assert "computing: 0 s " in terminal.getvalue()
+
+
 def test_short_work_shows_nothing(monkeypatch):
     terminal = on_terminal(monkeypatch)
     monkeypatch.setattr(progress, "SHOW_AFTER_S", 5.0)
