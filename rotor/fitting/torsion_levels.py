@@ -126,15 +126,15 @@ class TorsionLevels(LevelModel):
         """Energies and derivatives of the labels of one species."""
         levels = self._solved(part, name, model)
         further = further_operators(model, name, chain)
-        elements = levels.functions.elements(list(further.values())) if further else None
         if self.spins is None:
+            elements = levels.functions.elements(list(further.values())) if further else None
             rows = _label_rows(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
             values, direct = levels.energies[rows], levels.slopes(rows)
             if elements is not None:
                 direct = np.hstack([direct, levels.slopes(rows, elements)])
             spin_slopes: dict[str, Floats] = {}
         else:
-            moments = TorsionMoments(levels, model, elements)
+            moments = TorsionMoments(levels, model, chain, further)
             spins = self.spins.derivatives(named, model.frame, chain)
             values, direct, spin_slopes = _with_spins(self.spins, part, moments, self.spins.valued(named), spins)
         count = len(model.coefficients)

@@ -38,9 +38,11 @@ class ChainRule:
         """dE/dc (count, names) from `direct`, the slopes (count,) by each coefficient and quantity at fixed others."""
         none = np.zeros(count)
         total = np.column_stack([direct.get(name, none) for name in names])
-        if self.quantities:
-            columns = [names.index(name) for name in self.constants]
-            total[:, columns] += np.column_stack([direct[name] for name in self.quantities]) @ self.jacobian
+        here = [i for i, name in enumerate(self.constants) if name in names]
+        if here:
+            columns = [names.index(self.constants[i]) for i in here]
+            by_quantity = np.column_stack([direct[name] for name in self.quantities])
+            total[:, columns] += by_quantity @ self.jacobian[:, here]
         return total
 
 

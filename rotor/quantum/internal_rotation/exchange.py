@@ -43,11 +43,13 @@ TURNS = {"a": (1.0, -1.0, -1.0), "b": (-1.0, 1.0, -1.0), "c": (-1.0, -1.0, 1.0)}
 class ExchangedTops(TorsionRotation):
     """Functions of two tops with σ1 = σ2 that have a sign x under the exchange by C2 about `axis`.
 
-    partner (n_v,): number of the product (t2, t1) for each product (t1, t2). Sums of a pair have the lower number, differences the higher.
+    partner (n_v,): number of the product (t2, t1) for each product (t1, t2). lower (K, n_v): 1 where the sum of a pair has the lower energy
+    and thus the lower number, -1 where the difference has; the phases of functions of different K are unrelated.
     """
 
     axis: str
     partner: Ints
+    lower: Ints
 
     @property
     def has_parity(self) -> bool:
@@ -67,7 +69,9 @@ class ExchangedTops(TorsionRotation):
         plain: dict[str, Any] = dict(self.plain_labels)
         count, t = len(plain["t"]), plain["t"]
         other = self._row(plain["J"], plain["K"], self.partner[t], plain["s"])
-        first = np.where(t <= self.partner[t], 1.0, -1.0)  # sign of each function in its combination with the partner
+        lower = self.lower[plain["K"] + self.torsion.k_max, t]
+        # sign of each function in its combination with the partner
+        first = np.where(t == self.partner[t], 1.0, np.where(t < self.partner[t], lower, -lower))
         matrix = _pairs(np.arange(count), other, first)
         sign = first.astype(np.int64)
         if self.has_parity and not self.folded:

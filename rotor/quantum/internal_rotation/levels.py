@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.labelled import Elements
 from rotor.quantum.blocks import ByBlocks, Entries, elements_by_blocks, expectations
+from rotor.quantum.internal_rotation.chain_rule import NO_CHAIN, ChainRule, chain_rule, further_operators
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts
 from rotor.quantum.internal_rotation.functions import TorsionRotation
@@ -49,13 +48,16 @@ MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a who
 class TorsionMoments(SpeciesMoments):
     """Operators of one species; elements between functions are computed at first use.
 
-    further: operators by which levels are derived besides the terms of the Hamiltonian.
+    chain: dependence of F, ρ and its direction on constants of principal axes. further: operators of the quantities of the chain that are
+    no coefficients of the Hamiltonian, by name.
     """
 
     levels: SpeciesLevels
     model: TurningTops
-    further: Elements | None = None
+    chain: ChainRule = NO_CHAIN
+    further: Mapping[str, Sequence[Product]] = field(default_factory=dict)
     _cache: dict[Rotor | BodyTensor, ByBlocks] = field(default_factory=dict)
+    _derived: dict[str, ByBlocks] = field(default_factory=dict)
 
     @property
     def combined(self) -> bool:
@@ -85,21 +87,33 @@ class TorsionMoments(SpeciesMoments):
 
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
-        constants = list(self.model.values)
-        slopes = self.term_slopes(mixtures) @ self.model.jacobian
-        none = np.zeros(len(slopes))
-        return np.column_stack([slopes[:, constants.index(name)] if name in constants else none for name in names])
+        required = {*names, *self.chain.quantities} if set(names) & set(self.chain.constants) else set(names)
+        jacobian = dict(zip(self.model.values, self.model.jacobian.T, strict=True))
+        terms = list(self.levels.source.terms)
+        needed = {terms[i] for name in required & set(jacobian) for i in np.flatnonzero(jacobian[name])}
+        count = mixtures[0][1].shape[-1]
+        slopes = self._slopes_by(needed | (required & set(self.further)), mixtures)
+        by_terms = np.column_stack([slopes.get(term, np.zeros(count)) for term in terms])
+        direct = {name: by_terms @ column for name, column in jacobian.items() if name in required}
+        direct |= {name: slopes[name] for name in self.further if name in required}
+        return self.chain.slopes(names, direct, count)
 
     def term_slopes(self, mixtures: Mixtures) -> Floats:
         """∂E/∂c (n, terms and further operators) of mixtures of states, by coefficients of the Hamiltonian."""
-        vectors = {block.basis.number: np.tensordot(block.vectors, mixture, 1) for block, mixture in mixtures}
-        return np.hstack([expectations(entries, vectors, count) for entries, count in self._terms])
+        return np.column_stack(list(self._slopes_by([*self.levels.source.terms, *self.further], mixtures).values()))
 
-    @cached_property
-    def _terms(self) -> list[tuple[ByBlocks, int]]:
-        """Elements of the terms, and of further operators, by pairs of blocks, and the number of operators."""
-        operators = [*self.levels.source.separate_elements, *([] if self.further is None else [self.further])]
-        return [(elements_by_blocks(each, self.levels.members), len(each.values)) for each in operators]
+    def _slopes_by(self, operators: Iterable[str], mixtures: Mixtures) -> dict[str, Floats]:
+        """⟨ψ|O|ψ⟩ (n,) of mixtures of states for terms and further operators, by name."""
+        vectors = {block.basis.number: np.tensordot(block.vectors, mixture, 1) for block, mixture in mixtures}
+        return {name: expectations(self._elements_by(name), vectors, 1)[:, 0] for name in operators}
+
+    def _elements_by(self, name: str) -> ByBlocks:
+        """Elements of a term or of a further operator by pairs of blocks."""
+        if name not in self._derived:
+            products = self.levels.source.terms.get(name) or self.further[name]
+            elements = self.levels.functions.elements([products])
+            self._derived[name] = elements_by_blocks(elements, self.levels.members)
+        return self._derived[name]
 
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
@@ -143,13 +157,15 @@ def torsion_rotation_levels(
     """
     refuse_axes(top)
     model = turning_tops(top, constants)
+    chain = chain_rule(model, {**top.constants.values, **constants.values})
     degeneracies = Degeneracies.from_model(model, constants)
     blocks, pieces = list[SolvedBlock](), list[Columns]()
     for name in model.species:
         species = species_blocks(model, name, jmin, jmax, constants.functions).solve_once(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
-        blocks += species_rotors(TorsionMoments(species, model), degeneracies.components(name))
+        moments = TorsionMoments(species, model, chain, further_operators(model, name, chain))
+        blocks += species_rotors(moments, degeneracies.components(name))
         quanta = {key: species.quanta[key] for key in ("vt", "j", "ka", "kc")}
         pieces.append(degeneracies.columns(name, species.functions, species.names) | quanta)
     energies = np.concatenate([block.energies_mhz for block in blocks])

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.labelled import Basis, rotation_labels
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.exchange import TURNS, ExchangedTops, exchange_axis
 from rotor.quantum.internal_rotation.frames import IN_PLANE, torsional_kinetics
@@ -54,10 +55,14 @@ class InternalTop:
 
 @dataclass(frozen=True, eq=False)
 class ProductTorsion:
-    """Products of contracted functions of several tops; retained (products, tops): numbers t1, t2 ... of their factors."""
+    """Products of contracted functions of several tops; retained (products, tops): numbers t1, t2 ... of their factors.
+
+    mixing (K, products, functions): sums of the products of each K that are the functions instead; None for the products themselves.
+    """
 
     tops: tuple[ContractedTorsion, ...]
     retained: Ints
+    mixing: Floats | None = None
 
     @property
     def sigma(self) -> int:
@@ -96,7 +101,11 @@ class ProductTorsion:
             top.tables(factor, change)[:, t[:, None], t]
             for top, factor, t in zip(self.tops, operators, self.retained.T, strict=True)
         )
-        return reduce(np.multiply, factors)
+        tables = reduce(np.multiply, factors)
+        if self.mixing is None or (operator is None and not change):
+            return tables
+        target = np.roll(self.mixing, -change, axis=0)  # tables are 0 where K + change is beyond k_max
+        return np.asarray(np.swapaxes(target, 1, 2) @ tables @ self.mixing)
 
 
 @dataclass(frozen=True)
@@ -165,12 +174,17 @@ class SeveralTops:
         sums = reduce(np.add.outer, [torsion.energies[jmax] for torsion in torsions])
         retained = _lowest(sums, count or DEFAULT_FUNCTIONS[len(self.tops)], exchanged)
         product: Any = ProductTorsion(tuple(torsions), retained)
+        matrices = self._torsional_matrices(product, species)
         folded = not any(species) and self.has_plane
         if exchanged:
             number = {pair: i for i, pair in enumerate(map(tuple, retained.tolist()))}
             partner = np.array([number[t2, t1] for t1, t2 in retained.tolist()])
-            functions: TorsionRotation = ExchangedTops(product, jmin, jmax, folded, self.axis, partner)
+            coupling = matrices[:, np.arange(len(partner)), partner]
+            lower = np.where(coupling + coupling[::-1] > 0, -1, 1)  # the same for K and -K
+            functions: TorsionRotation = ExchangedTops(product, jmin, jmax, folded, self.axis, partner, lower)
         else:
+            if not folded:
+                product = replace(product, mixing=np.linalg.eigh(matrices)[1])
             functions = TorsionRotation(product, jmin, jmax, folded)
         chosen = None if needed is None else np.isin(functions.labels["J"], needed)
         return SpeciesHamiltonian(functions, self.terms(species), chosen)
@@ -197,6 +211,20 @@ class SeveralTops:
             terms[f"V{pair}"] = (Product(0.5 * UNIT, self._acting({i: hindering, j: hindering})),)
             terms[f"V{pair}s"] = (Product(-0.5 * UNIT, self._acting({i: real_sine, j: real_sine})),)
         return terms
+
+    def _torsional_matrices(self, product: ProductTorsion, species: Species) -> Floats:
+        """The torsion of all tops with F_ij π_i π_j, V_ij and V_ijs over the products of each K (K, products, products).
+
+        The products (1, 0) and (0, 1) of similar tops have nearly equal energies, so that even a small coupling mixes them fully; v_t
+        would be shared out at random without it.
+        """
+        rotation, terms = Basis(rotation_labels(product.k_max, product.k_max)), self.terms(species)
+        matrices = np.stack([np.diag(energies) for energies in product.energies])
+        for name, value in self.between.items():
+            for factor in terms[name] if value else ():
+                along_k = np.diag(rotation.elements([factor.rotation]).dense()).real
+                matrices += value * along_k[:, None, None] * product.tables(factor.torsion, 0)
+        return matrices
 
     def _acting(self, operators: Mapping[int, Operator]) -> Any:
         """Torsional operators by the number of their top as one for each top, None for the unit operator."""

@@ -48,13 +48,6 @@ class SpeciesHamiltonian:
         """Elements of each term."""
         return self.functions.elements(list(self.terms.values()))
 
-    @property
-    def separate_elements(self) -> list[Elements]:
-        """Elements of the terms on patterns of their own, in order, which are smaller; on the common one where a fit has made that."""
-        if "elements" in self.__dict__:
-            return [self.elements]
-        return [self.functions.elements([term]) for term in self.terms.values()]
-
     @cached_property
     def linear(self) -> FunctionBlocks:
         """The connected blocks of all terms."""

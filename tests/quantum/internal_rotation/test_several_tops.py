@@ -9,10 +9,12 @@ from linear_functions import energies_of
 
 import rotor
 from rotor import units
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.levels import energies_alone
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.several_tops import InternalTop, SeveralTops, several_tops
+from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = units.MHZ_PER_CM
 ABC = {"A": 9800.0, "B": 4300.0, "C": 3200.0}
@@ -342,3 +344,47 @@ def test_long_sums_of_three_tops_are_refused(tmp_path):
     top = rotor.read(path)
     with pytest.raises(ValueError, match="blocks of 2460 functions; give the partition function"):
         energies_alone(top, top.internal_rotation, (), 20, 20)
+
+
+@pytest.mark.parametrize("axis", ["a", "b"])
+def test_torsional_states_of_similar_tops_are_the_same_in_every_species(axis):
+    """F12 mixes (1, 0) and (0, 1) of equal tops fully: v_t = 1 is the lower state of the pair in AA and in AE, not a share of both."""
+    angles = {"b": {"delta_2": np.pi - 0.6}, "a": {"delta_2": -0.6}}[axis]
+    top = {"F0_1": 160e3, "delta_1": 0.6, "V3_1": 900 * CM, "F0_2": 160e3, "V3_2": 900 * CM}
+    model = several_tops(ABC, top | angles)
+    assert model.axis == axis
+    energies = {}
+    for name in ("AA", "AE", "EE", "EE*"):
+        levels = model.blocks(model.species[name], 3, count=16).solve_once(model.coefficients, 2)
+        chosen = levels.quanta["j"] == 3
+        energies[name] = [np.sort(levels.energies[chosen & (levels.vt == v)]) for v in (1, 2)]
+    assert np.abs(energies["AA"][1] - energies["AA"][0]).min() > 1.5 * CM  # the pair is apart
+    for name in ("AE", "EE", "EE*"):
+        assert np.abs(np.array(energies[name]) - energies["AA"]).max() < 0.3 * CM  # the tunnelling splitting of v_t = 1
+
+
+@pytest.mark.parametrize("tops", [1, 2])
+def test_derivatives_of_predicted_levels_are_those_of_finite_differences(tops):
+    """By constants of the principal axes, which act through F, ρ and F12 too: errors of F0 were left out without them."""
+    values = {"F0_1": 158e3, "delta_1": 0.56, "V3_1": 250 * CM, "F0_2": 161e3, "delta_2": 2.5, "V3_2": 340 * CM}
+    if tops == 1:
+        values = {name[:-2]: value for name, value in values.items() if name.endswith("_1")}
+
+    def levels_of(**changed):
+        both = ABC | values | changed
+        constants = rotor.Constants(**{name: both[name] for name in "ABC"}, reduction="A", representation="Ir")
+        internal = InternalRotationConstants({name: both[name] for name in values}, "PAM", vt_max=0)
+        top = rotor.Top.from_constants(constants, internal_rotation=internal)
+        return top, rotor.api.solve_levels(top, 2)
+
+    top, levels = levels_of()
+    names = ["A", "B", *values]
+    slopes = level_derivatives(top, levels, names)
+    assert np.allclose(level_derivatives(top, levels, names[2:3]), slopes[:, 2:3], rtol=1e-12)
+    for i, name in enumerate(names):
+        value = (ABC | values)[name]
+        step = 1e-5 * value
+        up, down = (levels_of(**{name: value + sign * step})[1].energy_mhz for sign in (1, -1))
+        expected = (up - down) / (2 * step)
+        noise = 4e-8 / step  # rounding of eigenvalues of matrices with elements up to 1e8 MHz
+        assert np.allclose(slopes[:, i], expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max() + noise), name

@@ -32,7 +32,7 @@ def test_energies_and_vectors_are_those_of_the_whole_matrix(resonance):
 
 
 def test_without_convergence_all_states_are_solved(monkeypatch):
-    monkeypatch.setattr(dominated, "STEPS", 1)
+    monkeypatch.setattr(dominated, "SPACE", 0.05)
     assert dominated_states(csr_array(np.tril(matrix_of(3.0))), np.arange(12)) is None
     assert dominated_states(csr_array(np.tril(matrix_of(3.0))), np.arange(100)) is None  # too many
     assert dominated_states(csr_array(np.tril(matrix_of(3.0, size=100))), np.arange(5)) is None  # small
