@@ -31,10 +31,11 @@ HERE = Path(__file__).resolve().parent
 CASES = HERE / "corpus_cases"
 SCENES = (CASES / "scenes.txt").read_text(encoding="utf-8").split("\n----\n")
 TIMED = re.compile(
-    r"\"(seconds|processor_time_s)\": [^,\n]*|seconds +\S+|\(\S+ s\)|rotor_version\": \"[^\"]*\"|\"version\": \"[^\"]*\""
+    r"\"(seconds|processor_time_s)\": [^,\n]*|seconds +\S+|computed now in \S+ s|\(\S+ s\)|"
+    r"rotor_version\": \"[^\"]*\"|\"version\": \"[^\"]*\""
 )
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
-MOST_SECONDS = 60
+MOST_SECONDS, MOST_CHARACTERS = 60, 60_000
 BINARY = (".png", ".pdf", ".svg", ".parquet", ".npz", ".traj", ".rotorcat")
 
 
@@ -92,12 +93,10 @@ def run(words: list[str], folder: Path, inputs: set[str], checkout: Path) -> dic
     for path in sorted(folder.rglob("*")):
         if path.is_file() and path.name not in inputs:
             binary = path.suffix in BINARY
-            files[path.name] = "binary" if binary else path.read_text("utf-8", errors="replace")[:40_000]
-    texts = {"out": out.getvalue()[:60_000], "err": err.getvalue()} | {
-        f"file {name}": text for name, text in files.items()
-    }
+            files[path.name] = "binary" if binary else path.read_text("utf-8", errors="replace")
+    texts = {"out": out.getvalue(), "err": err.getvalue()} | {f"file {name}": text for name, text in files.items()}
     clean = {
-        name: TIMED.sub("", text.replace(str(folder), "FOLDER").replace(str(checkout), "CHECKOUT"))
+        name: TIMED.sub("", text.replace(str(folder), "FOLDER").replace(str(checkout), "CHECKOUT"))[:MOST_CHARACTERS]
         for name, text in texts.items()
     }
     return {"code": code, "seconds": round(time.process_time() - start, 3), **clean}
