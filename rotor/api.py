@@ -14,7 +14,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import did_you_mean
+from rotor.checks import did_you_mean, no_molecule
 
 if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this module
     from rotor import units as units
@@ -295,7 +295,7 @@ def _reading_tops(function: Callable[..., Any]) -> Callable[..., Any]:
         _refuse_arguments(function, (top, *args), options)
         value = top if isinstance(top, Top) else read(top)
         if not isinstance(value, Top):
-            raise ValueError(f"{top}: holds a {type(value).__name__}, not a molecule or constants")
+            raise no_molecule(top, value)
         return function(value, *args, **options)
 
     return call

@@ -88,6 +88,19 @@ def require_top(value: object) -> None:
         raise ValueError(f"top: {value!r:.60}: expected a Top; rotor.read makes one of a name, a file or a molecule")
 
 
+_HELD = {
+    "Catalogue": "a catalogue of lines (rotor cat shows it)",
+    "LineList": "a list of measured lines (rotor fit finds constants from it)",
+    "LevelList": "a list of levels",
+}
+
+
+def no_molecule(source: object, value: object) -> ValueError:
+    """The error for a file that was read and holds something else than a molecule."""
+    name = type(value).__name__
+    return ValueError(f"{source}: holds {_HELD.get(name, f'a {name}')}, not a molecule or constants")
+
+
 class NoAnswerError(RuntimeError):
     """The input is valid, but no answer was reached: exit code 1, and no file is written."""
 

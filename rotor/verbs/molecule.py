@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.checks import no_molecule
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
 from rotor.requests.fill import Entries, naming, read_instance, within
@@ -280,7 +281,7 @@ def _from_source(reading: Reading) -> Top:
     with within(reading.named("source")) if reading.style == "key" else nullcontext():
         top: object = read(source, isotopes=",".join(inputs.isotopes) or None)
     if not isinstance(top, Top):
-        raise ValueError(f"{source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
+        raise no_molecule(source, top)
     return top
 
 

@@ -123,7 +123,9 @@ def show(answer: StructureAnswer, report: Report) -> Iterable[Part | None]:
             ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
             ("search", fit.minimum.reason),
         ]
-        yield record_table(f"{fit.method} without", _WITHOUT, answer.without.get(fit.method, ()), {"isotopologue"})
+        yield record_table(
+            f"{fit.method} fitted without each in turn", _WITHOUT, answer.without.get(fit.method, ()), {"isotopologue"}
+        )
     yield error_facts(report.content.get("errors"))
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.checks import no_molecule
 from rotor.fitting.parameters import with_names
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.fitting.top_levels import label_model
@@ -75,7 +76,7 @@ def source_top(source: str) -> Top:
     source, isotopes = without_isotopes(source)
     top = read(source, isotopes=isotopes or None)
     if not isinstance(top, Top):
-        raise ValueError(f"{source}: holds a {type(top).__name__}, not a molecule or constants")
+        raise no_molecule(source, top)
     return top
 
 

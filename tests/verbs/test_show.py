@@ -154,7 +154,9 @@ def test_names_of_molecules_are_tops(by_word, by_top):
 
 def test_a_catalogue_is_no_top(tmp_path):
     rotor.write(rotor.api.line_list("CO", jmax=3), tmp_path / "co.cat")
-    with pytest.raises(ValueError, match="holds a Catalogue, not a molecule or constants"):
+    with pytest.raises(
+        ValueError, match=r"holds a catalogue of lines \(rotor cat shows it\), not a molecule or constants"
+    ):
         rotor.api.line_list(str(tmp_path / "co.cat"))
 
 
