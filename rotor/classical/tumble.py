@@ -101,6 +101,11 @@ class TumbleRequest:
         return {"kind": self.kind, "notes": list(self.notes), "temperature_k": None}
 
     @property
+    def relative_errors(self) -> Floats | None:
+        """Relative errors of the moments (3,); None: not known."""
+        return None
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Notes on unusual properties of the body."""
         if self.named is not None:
@@ -150,7 +155,8 @@ class TumbleAnswer(TextOf):
 
         factors = (self.request.units.time_factor, self.request.units.momentum_factor)
         last = float(np.abs(self.table.times).max()) / self.request.units.time_factor
-        return attitude_budget(self.motion, last, self.stability.growth_rate, converted=factors != (1.0, 1.0))
+        growth, converted = self.stability.growth_rate, factors != (1.0, 1.0)
+        return attitude_budget(self.motion, last, growth, converted, self.request.relative_errors)
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its table, by the keys of docs/verbs."""

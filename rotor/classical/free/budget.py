@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotor.arrays import Floats
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 
 if TYPE_CHECKING:
@@ -26,10 +27,16 @@ EPS = sys.float_info.epsilon
 EVALUATED = 32 * EPS  # theta functions, and products of three quaternions
 DOUBLED = 64 * EPS**2  # of a phase in two doubles
 LAST_DIGITS = 4 * EPS  # error of k'² if six numbers each have an error of one unit in the last place
+SMALL_TURN, SMALLEST_CHANGE = (
+    1e-4,
+    1e-12,
+)  # rad by which a varied moment turns the attitude; relative change of a moment
 EXACT_INPUT = "moments and angular momentum have no stated uncertainty"
 
 
-def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, converted: bool) -> ErrorBudget:
+def attitude_budget(
+    motion: FreeMotion, last: float, growth_rate: float, converted: bool, relative: Floats | None = None
+) -> ErrorBudget:
     """The errors of the attitude of one body.
 
     Parameters
@@ -41,6 +48,8 @@ def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, convert
         Growth rate of a small deviation from the unstable axis; 0 without such an axis.
     converted : bool
         Whether times and momenta were converted from other units.
+    relative : (3,) array, optional
+        Relative errors of the moments; None: not known.
 
     Returns
     -------
@@ -56,7 +65,7 @@ def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, convert
         rounding=ErrorTerm(rounding, f"{how}, at most {turned:.2g} rad turned"),
         truncation=ErrorTerm(0.0, "closed form"),
         model=ErrorTerm(None, "a rigid body without torques"),
-        data=_data(motion, last, growth_rate),
+        data=_data(motion, last, growth_rate, relative),
         statistics=ErrorTerm(0.0, "nothing is sampled"),
     )
 
@@ -72,15 +81,40 @@ def _fastest(motion: FreeMotion) -> float:
     return float(np.linalg.norm(motion.momentum0) / moments.min())
 
 
-def _data(motion: FreeMotion, last: float, growth_rate: float) -> ErrorTerm:
-    """The term of the data: not estimated, with a note if their last digits leave the phase of the flips unknown."""
+def _data(motion: FreeMotion, last: float, growth_rate: float, relative: Floats | None) -> ErrorTerm:
+    """The term of the data: errors of the moments if known, or a note if last digits leave the phase of the flips unknown."""
     shift = flip_phase_error(float(motion.period), last, growth_rate)
+    if shift < 1.0 and relative is not None:
+        error, source = moments_error(motion, last, relative), "errors of A, B, C, at the given angular momentum"
+        lost = ", which lose the attitude" if error > 1.0 else ""
+        return ErrorTerm(min(error, math.pi), source + lost, "better constants")
     if shift < 1.0:
         return ErrorTerm(None, EXACT_INPUT)
     return ErrorTerm(
         None,
         f"the phase of the flips is not known after {last:.2g}, one unit in the last place of the data moves it by {shift:.2g} rad",
     )
+
+
+def moments_error(motion: FreeMotion, last: float, relative: Floats) -> float:
+    """Error of the attitude at a time, in rad, to first order in relative errors of the moments (3,); equal moments change together.
+
+    >>> from rotor.classical.free.free_motion import free_motion
+    >>> round(moments_error(free_motion([0.0, 2.0, 2.0], [0.0, 6.0, 0.0]), 5.0, np.full(3, 1e-3)), 6)  # of 15 rad
+    0.015
+    """
+    from rotor.classical.free.free_motion import free_motion
+    from rotor.geometry.rotations import distance
+
+    turned, errors = max(_fastest(motion) * last, 1.0), []
+    for moment in set(motion.moments[motion.moments > 0].tolist()):
+        equal = motion.moments == moment
+        error = float(relative[equal].max())
+        step = max(min(error, SMALL_TURN / turned), SMALLEST_CHANGE)
+        varied = free_motion(np.where(equal, moment * (1.0 + step), motion.moments), motion.momentum0)
+        moved = distance(varied.at([last])[1][0], motion.at([last])[1][0])
+        errors.append(float(moved) * error / step)
+    return math.hypot(*errors)
 
 
 def flip_phase_error(period: float, last: float, growth_rate: float) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotor import units
+from rotor.arrays import Floats
 from rotor.checks import require_positive
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
 from rotor.classical.motion import Units
@@ -34,6 +35,19 @@ class MolecularTumble(TumbleRequest):
         """Facts about the top, by the keys of docs/verbs."""
         assert self.top is not None
         return {**top_facts(self.top), "temperature_k": self.temperature_k}
+
+    @property
+    def relative_errors(self) -> Floats | None:
+        """Stated or estimated relative errors of A, B, C, those of the moments too; None if one of them is not known."""
+        assert self.top is not None
+        constants, known = self.top.constants, {**self.top.constants.uncertainties, **self.top.estimated_errors_mhz}
+        errors = {
+            value: known.get(name, math.nan) for name, value in constants.values.items() if name in ("A", "B", "C")
+        }
+        rotations = [value for value in self.top.rotational_constants_mhz if math.isfinite(value)]
+        linear = [0.0] * (3 - len(rotations))
+        relative = np.array([*linear, *(errors.get(value, math.nan) / value for value in rotations)])
+        return None if np.isnan(relative).any() else relative
 
 
 def thermal_tumble(
