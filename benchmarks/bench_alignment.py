@@ -24,7 +24,7 @@ from rotor.alignment.align import align
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, GaussianPulse
 from rotor.alignment.qutip_objects import block_objects, solve_windows
 from rotor.quantum.effects.stark import stark_map
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import field_space
 from rotor.tops.top import Top
 

@@ -206,7 +206,7 @@ def modules_of_a_rigid_spectrum() -> int:
     code = (
         "import sys, rotor; top = rotor.Top.from_constants('A=9 B=4 C=3 GHz', dipole_abc_debye=(1, 0, 0));"
         "rotor.line_list(top, jmax=5, temperature_k=10);"
-        "print(sum('quantum.internal_rotation' in name or name.endswith('operators.torsion') for name in sys.modules))"
+        "print(sum('quantum.internal_rotation' in name or name.endswith('quantum.torsion') for name in sys.modules))"
     )
     return int(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
 

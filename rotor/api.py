@@ -171,8 +171,8 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.quantum.basis.labelled import Basis as Basis
     from rotor.quantum.basis.labelled import rotation_labels as rotation_labels
     from rotor.quantum.blocks import linear_blocks as linear_blocks
-    from rotor.quantum.effects.hyperfine import quadrupole_of_tensor as quadrupole_of_tensor
     from rotor.quantum.effects.of_top import effects_of as effects_of
+    from rotor.quantum.effects.spin_effect import quadrupole_of_tensor as quadrupole_of_tensor
     from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2 as MHZ_ANGSTROM3_W_PER_CM2
     from rotor.quantum.effects.stark import StarkRequest as StarkRequest
     from rotor.quantum.effects.stark import answer_stark as answer_stark

@@ -11,7 +11,7 @@ import numpy as np
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, GaussianPulse, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window
 from rotor.arrays import Floats
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -33,7 +33,7 @@ ROUND_OFF = 1e-9  # largest imaginary part of an element, relative to the larges
 def absolute_cosine(block: FieldBlock) -> Floats:
     """⟨J' k M| |cosθ| |J k M⟩ over a block (n, n) of a linear or symmetric top, θ of its figure axis; exact but for round-off.
 
-    >>> from rotor.quantum.fields.operators import Contraction
+    >>> from rotor.quantum.fields.blocks import Contraction
     >>> from rotor.quantum.fields.solved_space import field_space
     >>> from rotor.tops.top import Top
     >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))

@@ -17,8 +17,7 @@ from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.timeline import Window
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import AxialSpace
-from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.solved_space import field_space
 from rotor.tops.top import require_single_state
 

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from rotor.alignment.axis_functions import absolute_cosine, asymmetric_elements
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import AxialSpace
-from rotor.quantum.fields.blocks import FieldBlock
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction, FieldBlock
 from rotor.quantum.fields.solved_space import SolvedSpace
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window, timeline
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import cosine_bands
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import field_space
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.tops.top import require_single_state

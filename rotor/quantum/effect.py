@@ -20,8 +20,7 @@ from rotor.tops.operators import Operators, added
 
 if TYPE_CHECKING:
     from rotor.quantum.operators.algebra import Operator
-    from rotor.quantum.spins.operators import Rotor
-    from rotor.quantum.spins.scheme import Spin, SpinTerm
+    from rotor.quantum.spins.scheme import Rotor, Spin, SpinTerm
     from rotor.quantum.wang.basis import SpeciesFactors
     from rotor.tops.spins.spin_weights import SpinWeights
     from rotor.tops.top import Top
@@ -74,7 +73,7 @@ class Moment(NamedTuple):
 
     p is a direction in space, i and j are a, b, c. In a level of good parity electric and magnetic moments do not interfere.
     rotor: of rank 1, or the part on |N K⟩ that the vector of a spin multiplies. spin: the name of that spin, "" for none. electric: whether
-    it adds to the electric dipole in amplitude; elements are those of i times the moment (`spins.operators`). imaginary: whether elements
+    it adds to the electric dipole in amplitude; elements are those of i times the moment (`spins.scheme`). imaginary: whether elements
     are i times those of a plain dipole within one state: their squares are added.
     """
 

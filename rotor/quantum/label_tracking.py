@@ -227,19 +227,16 @@ class _Labelled:
 
     def _unclear(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
         """Blocks (blocks,) with a labelled state whose sub-block and rank among those that lead do not make its name."""
-        mostly, groups = self._follow(Follows.MOSTLY), self._follow(Follows.GROUPS)
-        unclear = self._follow(Follows.NOTHING)
+        mostly, groups = self._follow[Follows.MOSTLY], self._follow[Follows.GROUPS]
+        unclear = self._follow[Follows.NOTHING]
         if mostly.any():
             share = np.take_along_axis(shares, self.states, axis=1)
             unclear = unclear | (mostly & ((share < _CLEAR) & (self.rows >= 0)).any(axis=1))
         return unclear | (groups & self._shared(leading, shares)) if groups.any() else unclear
 
-    def _follow(self, what: Follows) -> NDArray[np.bool_]:
-        return np.asarray(self._follows == what.value)
-
     @cached_property
-    def _follows(self) -> Ints:
-        return np.array([block.named.follows.value for block in self.tracked])
+    def _follow(self) -> dict[Follows, NDArray[np.bool_]]:
+        return {what: np.array([block.named.follows is what for block in self.tracked]) for what in Follows}
 
     def _shared(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
         """Blocks (blocks,) in which sub-blocks lead other numbers of states than they have functions, so that some states up to the

@@ -24,7 +24,7 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.quantum.spins.operators import Rotor
+    from rotor.quantum.spins.scheme import Rotor
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 

@@ -7,12 +7,15 @@ and σ = 0 ... s - 1 is the species,
 
 (C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841, as the reviews that were read cite it; derived here). ρK is the share of the
 rotation of the whole molecule; without it (K = 0) this is the torsion alone. E(K, σ) is periodic: ρK → ρK + s changes nothing.
+
+Operators of α for the operator algebra count the labels k from the species σ of a threefold top, m = 3k + σ.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
+from rotor.quantum.operators.algebra import Operator, diagonal, shift
 
 WAVES = 12  # |k| of the free-rotor functions: m up to 36 for a threefold top, exact to 1e-12 of a barrier of 1000 F below v_t = 4
 
@@ -119,3 +123,25 @@ def _potential_matrix(potential: TorsionalPotential, fold: int, size: int) -> ND
             matrix += np.diag(beside, -(n // fold)) + np.diag(beside.conj(), n // fold)
     matrix += np.eye(size) * sum(0.5 * value for value in potential.cosines.values())
     return matrix
+
+
+@cache  # the same object each time: sums of terms are merged by their operator of the torsion
+def p_alpha(sigma: int, power: int = 1) -> Operator:
+    """p^r = (-i d/dα)^r, m^r on exp(i m α)."""
+    return diagonal(lambda labels: (3 * labels["k"] + float(sigma)) ** power)
+
+
+@cache
+def cosine(multiple: int) -> Operator:
+    """cos 3sα for s = `multiple`: half of each shift of k by ±s."""
+    return 0.5 * (_step(multiple) + _step(-multiple))
+
+
+@cache
+def sine(multiple: int) -> Operator:
+    """sin 3sα = (exp(3isα) - exp(-3isα))/2i."""
+    return -0.5j * (_step(multiple) - _step(-multiple))
+
+
+def _step(multiple: int) -> Operator:
+    return shift(lambda labels: 1.0, k=multiple)

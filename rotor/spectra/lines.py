@@ -24,14 +24,14 @@ from rotor.checks import require_positive, require_whole
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.convergence import warnings_of
-from rotor.quantum.estimates.uncertainty import (
+from rotor.quantum.estimates.budgets import (
     known_covariance,
     level_spread,
     line_errors,
     source_of_errors,
     without_errors,
 )
+from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels

@@ -17,8 +17,7 @@ from rotor.quantum.estimates.accuracy import (
     levels_error,
     rounding_of,
 )
-from rotor.quantum.estimates.left_out import neglected_in_levels
-from rotor.quantum.estimates.plans import effect_texts, level_parts, plan_fields
+from rotor.quantum.estimates.plans import effect_texts, level_parts, neglected_in_levels, plan_fields
 from rotor.requests.budget import ErrorTerm
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics

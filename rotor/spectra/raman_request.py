@@ -11,9 +11,14 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.budgets import parameter_names
+from rotor.quantum.estimates.budgets import (
+    known_covariance,
+    level_spread,
+    line_errors,
+    parameter_names,
+    source_of_errors,
+)
 from rotor.quantum.estimates.limits import all_limits, limit_facts
-from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget

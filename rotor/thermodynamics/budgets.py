@@ -15,9 +15,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, model_term
+from rotor.quantum.estimates.budgets import (
+    ESTIMATES,
+    NO_SAMPLES,
+    NO_UNCERTAINTIES,
+    known_covariance,
+    model_term,
+    source_of_errors,
+)
 from rotor.quantum.estimates.limits import SPIN_LIMITS
-from rotor.quantum.estimates.uncertainty import ESTIMATES, known_covariance, source_of_errors
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.thermodynamics.functions import GAS_CONSTANT
 from rotor.units import MHZ_PER_K

@@ -31,7 +31,7 @@ from rotor.alignment.pulse import (
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.alignment.timeline import timeline
 from rotor.quantum.estimates.limits import all_limits
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import field_space
 from rotor.tops.top import Top
 

@@ -17,7 +17,7 @@ from rotor.fitting.search import robust
 from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.lin import read_lin
-from rotor.quantum.estimates.uncertainty import level_errors
+from rotor.quantum.estimates.budgets import level_errors
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
@@ -111,7 +111,7 @@ def test_few_iterations_are_enough_where_nothing_is_left(fitted):
 
 
 def test_the_covariance_goes_into_errors_of_lines(fitted):
-    """Prediction errors of the fit are those that rotor.quantum.estimates.uncertainty makes of its covariance."""
+    """Prediction errors of the fit are those that rotor.quantum.estimates.budgets makes of its covariance."""
     top = Top(fitted.constants)
     levels = solve_levels(top, 12)
     spread = level_errors(top, levels, fitted.covariance)
@@ -126,7 +126,7 @@ def test_the_covariance_goes_into_errors_of_lines(fitted):
         levels.find(**dict(zip(ASYMMETRIC, side[i].tolist(), strict=True)))
         for side in (fitted.lines.upper, fitted.lines.lower)
     ]
-    from rotor.quantum.estimates.uncertainty import level_spread, line_errors
+    from rotor.quantum.estimates.budgets import level_spread, line_errors
 
     computed = line_errors(level_spread(top, levels, fitted.covariance), *(np.atleast_1d(end) for end in ends))
     assert computed[0] == pytest.approx(fitted.calculated_errors_mhz[i], rel=1e-6)  # levels solved twice

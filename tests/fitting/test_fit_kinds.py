@@ -19,8 +19,7 @@ from rotor.fitting.assignment import assignments, merged
 from rotor.fitting.choose import suggest_lines
 from rotor.fitting.fit import fit_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit, spfit_input
-from rotor.formats.spcat.fits.fit_states import FileLevels, excluded_parameters
-from rotor.formats.spcat.fits.unmeasured import unmeasured_lines
+from rotor.formats.spcat.fits.fit_states import FileLevels, excluded_parameters, unmeasured_lines
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import read_par
 

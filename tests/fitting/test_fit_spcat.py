@@ -17,7 +17,7 @@ from rotor.fitting.resampling import bootstrap
 from rotor.formats.spcat.file_quanta import quanta_format
 from rotor.formats.spcat.fits.fit_input import error_factor, fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit, quanta_names
-from rotor.formats.spcat.fits.fit_table import publication_rows
+from rotor.formats.spcat.fits.named_fit import publication_rows
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.solved_groups import variance_factor
 from rotor.formats.spcat.text.cat import read_cat

@@ -6,7 +6,7 @@ import numpy as np
 
 from rotor.quantum.basis.labelled import Basis, rotation_labels
 from rotor.quantum.operators.rotation import sum_of_powers
-from rotor.quantum.spins.operators import (
+from rotor.quantum.spins.scheme import (
     AxialState,
     ByElements,
     Cosines,

@@ -7,10 +7,9 @@ from typing import Any
 from random_hamiltonians import Case
 
 import rotor
-from rotor.quantum.effects.hyperfine import quadrupole_of_tensor
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.effects.spin_rotation import SpinRotation
+from rotor.quantum.effects.spin_effect import SpinRotation, quadrupole_of_tensor
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.spins import Spin
 from rotor.tops.internal_rotation import InternalRotationConstants

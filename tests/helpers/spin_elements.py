@@ -6,7 +6,7 @@ import numpy as np
 from plain_elements import tensor_elements
 
 from rotor.quantum.spins.coupling import ChainOperator
-from rotor.quantum.spins.operators import AxialState
+from rotor.quantum.spins.scheme import AxialState
 
 
 def elements_of_parts(up, low, tensors):

@@ -80,7 +80,7 @@ def energies(seed: int) -> list[float]:
 
 @cache
 def least_known_level():
-    from rotor.quantum.estimates.uncertainty import known_covariance, level_errors
+    from rotor.quantum.estimates.budgets import known_covariance, level_errors
     from rotor.quantum.request import LevelsRequest, answer_levels
 
     top = Top(ROD, (1.0, 0.5, 0.0))

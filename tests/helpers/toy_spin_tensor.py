@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins import Spin, SpinTerm
-from rotor.quantum.spins.operators import Cosines, Matrix
+from rotor.quantum.spins.scheme import Cosines, Matrix
 from rotor.tops.top import Top
 
 

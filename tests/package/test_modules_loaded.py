@@ -13,14 +13,14 @@ FAMILIES = (
     "rotor.fluids", "rotor.alignment", "rotor.fitting", "rotor.structures", "rotor.assignment", "rotor.observed",
     "rotor.classical", "rotor.classical.gas", "rotor.classical.effects", "rotor.classical.lyapunov",
     "rotor.quantum.spins", "rotor.quantum.fields", "rotor.quantum.internal_rotation",
-    "rotor.quantum.effects.hyperfine", "rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman",
+    "rotor.quantum.effects.spin_effect", "rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman",
     "rotor.quantum.effects.interactions",
     "rotor.spectra", "rotor.spectra.raman", "rotor.spectra.emission", "rotor.spectra.fields", "rotor.thermodynamics.functions",
     "matplotlib", "ase", "rdkit", "qutip", "numba", "duckdb", "pandas", "polars", "openmm", "dask",
 )  # fmt: skip
 SPINS_NAMED = {
     "rotor.quantum.spins",
-    "rotor.quantum.effects.hyperfine",
+    "rotor.quantum.effects.spin_effect",
 }  # constants of every effect may be free in a fit
 LOADED = {  # of FAMILIES, what a kind has a use for
     "spectrum": {"rotor.spectra", "rotor.thermodynamics.functions"},

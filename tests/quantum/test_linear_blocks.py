@@ -31,9 +31,9 @@ from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import UNIT, Operator, diagonal, half_anticommutator, shift
 from rotor.quantum.operators.rotation import body_tensor, j_squared, j_x, j_y, j_z, ladder, sum_of_powers
-from rotor.quantum.operators.torsion import cosine, p_alpha, sine
 from rotor.quantum.symmetric_top_elements import space_factor
 from rotor.quantum.tensors import spherical_components
+from rotor.quantum.torsion import cosine, p_alpha, sine
 
 ROUNDING = 32 * np.finfo(float).eps  # of the norm of a block
 RIGID = {"A": 9400.0, "B": 3100.0, "C": 2500.0}

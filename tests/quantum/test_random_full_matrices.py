@@ -18,7 +18,7 @@ from random_tops import top_and_effects
 
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.zeeman import zeeman_map
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import solved_levels, solved_space
 from rotor.quantum.solve import solve_levels
 from rotor.tops.top import Top

@@ -22,7 +22,7 @@ from rotor.fluids.motion.bodies import rigid_bodies
 from rotor.fluids.numerics import neglected_in_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.estimates.convergence import warnings_of
-from rotor.quantum.estimates.left_out import stray_field
+from rotor.quantum.estimates.plans import stray_field
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import scene_calculation

@@ -13,7 +13,7 @@ from rotor.formats.lines.line_tables import catalogue
 from rotor.formats.spcat.hamiltonian.codes import file_constants
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.par import read_par
-from rotor.quantum.estimates.uncertainty import level_errors
+from rotor.quantum.estimates.budgets import level_errors
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants

@@ -83,7 +83,7 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
     if full not in fit.parameters.names:
         raise ValueError(f"suggest: {name} is not among the free parameters {', '.join(fit.parameters.names)}")
     if request.spfit is not None and fit.constants is None:
-        from rotor.formats.spcat.fits.unmeasured import unmeasured_lines
+        from rotor.formats.spcat.fits.fit_states import unmeasured_lines
 
         upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
         return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:MOST_SUGGESTIONS]

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.left_out import neglected_in_levels
-from rotor.quantum.estimates.plans import effect_texts
+from rotor.quantum.estimates.plans import effect_texts, neglected_in_levels
 from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut

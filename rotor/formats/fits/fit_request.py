@@ -281,7 +281,7 @@ def with_more_lines(request: FitRequest, path: str) -> FitRequest:
 
 def fit_report(answer: FitAnswer) -> str:
     """The report of a fit with its input; for SPFIT's files with all parameters."""
-    from rotor.formats.spcat.fits.fit_table import parameter_section
+    from rotor.formats.spcat.fits.named_fit import parameter_section
 
     request, read = answer.request, answer.request.files
     files = [Path(file).name for file in (read.source, read.lin, read.merge) if file]
@@ -297,7 +297,7 @@ def fit_report(answer: FitAnswer) -> str:
 
 def fit_table(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
     """The table of a publication; ValueError as `publication_table`."""
-    from rotor.formats.spcat.fits.fit_table import publication_rows
+    from rotor.formats.spcat.fits.named_fit import publication_rows
 
     spfit = answer.request.spfit
     rows = publication_rows(spfit, answer.fit) if spfit and answer.fit.constants is None else ()

@@ -222,7 +222,8 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, *,
     """
     joined = {name: end_to_end([each.columns[name] for each, _ in lines]) for name in lines[0][0].columns}
     qnfmt = np.concatenate([np.full(len(each.columns["g_upper"]), code) for each, code in lines])
-    order = _rising(joined["frequency_mhz"])
+    frequency = joined["frequency_mhz"]
+    order = slice(None) if (frequency[1:] >= frequency[:-1]).all() else rising_order(frequency)
     numbers = {name: column[order] for name, column in joined.items()}
     with np.errstate(divide="ignore"):  # a strength of 0 has no logarithm
         numbers["lgint"] = np.log10(numbers["intensity"])
@@ -230,13 +231,6 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, *,
     upper, lower = (np.full((len(qnfmt), max(6, form.width)), BLANK, dtype=np.int16) for _ in range(2))
     upper[:, : form.width], lower[:, : form.width] = numbers["upper"], numbers["lower"]
     return predicted_catalogue(numbers, upper, lower, qnfmt[order].astype(np.int32), tag, linear=linear)
-
-
-def _rising(frequency_mhz: Floats) -> Ints | slice:
-    """The stable order of rising frequencies."""
-    if (frequency_mhz[1:] >= frequency_mhz[:-1]).all():
-        return slice(None)
-    return rising_order(frequency_mhz)
 
 
 _ALL_NUMBERS = 99  # quantum numbers; no file has as many

@@ -46,13 +46,12 @@ from rotor.formats.spcat.hamiltonian.symmetry import weights_agree
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass
-from rotor.quantum.connected import connected_parts
+from rotor.quantum.blocks import connected_parts
 from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
-from rotor.quantum.spins.operators import is_axial
-from rotor.quantum.spins.scheme import Spin
+from rotor.quantum.spins.scheme import Spin, is_axial
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

@@ -24,7 +24,7 @@ from rotor.formats.spcat.hamiltonian.coded_file import line_names
 from rotor.formats.spcat.hamiltonian.codes import FREE_ABOVE, HELD_BELOW, NO_LEADER, file_constants
 from rotor.formats.spcat.hamiltonian.states import file_states, options_alone
 from rotor.formats.spcat.text.int_file import Request
-from rotor.formats.spcat.text.par import Parameter, ParameterFile
+from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
@@ -180,7 +180,8 @@ def variance_factor(file: ParameterFile) -> Floats | None:
 
     Raises ValueError for correlations of another number of parameters, or that are not numbers.
     """
-    errors = np.array([_estimated(parameter) for parameter in file.parameters])
+    errors = np.array([0.0 if each.constrained else each.error or 0.0 for each in file.parameters])
+    errors[~((errors >= HELD_BELOW) & (errors < FREE_ABOVE))] = 0.0
     if not errors.any():
         return None
     leaders = [i for i, parameter in enumerate(file.parameters) if not parameter.constrained]
@@ -204,11 +205,6 @@ def variance_factor(file: ParameterFile) -> Floats | None:
             value = file.parameters[leader].value
             factor[i] = factor[leader] * (parameter.value / value) if value else 0.0
     return factor
-
-
-def _estimated(parameter: Parameter) -> float:
-    error = parameter.error or 0.0
-    return error if HELD_BELOW <= error < FREE_ABOVE and not parameter.constrained else 0.0
 
 
 def _correlations(file: ParameterFile) -> Floats:

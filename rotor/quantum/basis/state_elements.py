@@ -14,7 +14,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct, numbers_in_runs
 from rotor.quantum.basis.wang_functions import BetweenStates, WangElements, WangFunctions
-from rotor.quantum.connected import connected_parts
+from rotor.quantum.blocks import connected_parts
 from rotor.quantum.effect import Coupling, QuantumEffect, State, couplings_of
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, LinearStack, numbered, stack_numbers

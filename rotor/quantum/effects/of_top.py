@@ -43,9 +43,7 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
 
 def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     """Effects of spin constants, each with its parameters."""
-    from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-    from rotor.quantum.effects.spin_rotation import SpinRotation
-    from rotor.quantum.effects.spin_spin import SpinSpin
+    from rotor.quantum.effects.spin_effect import NuclearQuadrupole, SpinRotation, SpinSpin
     from rotor.quantum.spins.scheme import Spin
 
     kinds: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
@@ -97,12 +95,6 @@ def _refuse_across_a_line(top: Top) -> None:
                 )
 
 
-def _weights_of_states(top: Top) -> list[SpinWeights]:
-    """The spin weights of a top and of its states, without those that are equal for all levels."""
-    all_weights = [top.spin_weights, *(top.states.weights.values() if top.states else ())]
-    return [weights for weights in all_weights if weights.rule != "none"]
-
-
 def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
     """Raise ValueError if spin weights count two nuclei that have a total spin.
 
@@ -127,7 +119,8 @@ def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
 def _refuse_like_nuclei(top: Top) -> None:
     """Raise ValueError if spin weights count the exchange of like nuclei that are coupled one by one."""
     assert top.spin_constants is not None
-    all_weights = _weights_of_states(top)
+    all_weights = [top.spin_weights, *(top.states.weights.values() if top.states else ())]
+    all_weights = [weights for weights in all_weights if weights.rule != "none"]
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
     if len(top.spin_constants.totals) == 2:
         for weights in all_weights:

@@ -30,10 +30,10 @@ from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.fields.answer import MapAnswer
+from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.field_map import FieldMap, field_map
 from rotor.quantum.fields.inputs import INTENSITY, basis_field, read_direction, read_m, states_field, tolerance_field
 from rotor.quantum.fields.map_request import MOST_AT_EDGE, FieldKind, FieldTerm, MapRequest
-from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.hamiltonian_input import spins_field
 from rotor.requests.budget import ErrorTerm
 from rotor.requests.field import check_fields, declared

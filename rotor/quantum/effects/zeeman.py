@@ -29,10 +29,10 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import DEFAULT_TOLERANCE_MHZ, Z, checked_j, projections
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.fields.answer import MapAnswer
+from rotor.quantum.fields.blocks import Contraction, Magnet
 from rotor.quantum.fields.field_map import FieldMap, field_map
 from rotor.quantum.fields.inputs import basis_field, states_field, tolerance_field
 from rotor.quantum.fields.map_request import FieldKind, FieldTerm, MapRequest
-from rotor.quantum.fields.operators import Contraction, Magnet
 from rotor.quantum.hamiltonian_input import spins_field
 from rotor.requests.budget import ErrorTerm
 from rotor.requests.field import SPINS, check_fields, declared

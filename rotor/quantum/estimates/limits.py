@@ -120,7 +120,7 @@ def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Seq
 
 def _constant_limits(top: Top, j: int) -> list[Limit]:
     """Zero-point vibration of a geometry, and the distortion that rigid constants neglect."""
-    limits, b = [], _largest(top)
+    limits, b = [], sum(top.rotational_constants_mhz[1:]) / 2  # half the spacing of lines of neighbouring J
     rigid = not any(name not in "ABC" for name in top.constants.values)
     if top.source_geometry is not None:
         limits += _zero_point(top.source_geometry, 2 * b * (j + 1))
@@ -151,12 +151,6 @@ def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
 def _rounded(value: float, digits: int) -> str:
     """A number rounded to significant digits, as short text."""
     return f"{float(f'{value:.{digits}g}'):g}"
-
-
-def _largest(top: Top) -> float:
-    """B of a linear top, (B + C)/2 of others: half the spacing of lines of neighbouring J."""
-    _, b, c = top.rotational_constants_mhz
-    return (b + c) / 2
 
 
 def _nuclear_limits(

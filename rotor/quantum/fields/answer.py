@@ -13,9 +13,17 @@ import numpy as np
 
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
-from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, data_term, model_term, parameter_names
+from rotor.quantum.estimates.budgets import (
+    NO_SAMPLES,
+    NO_UNCERTAINTIES,
+    data_term,
+    known_covariance,
+    level_errors,
+    model_term,
+    parameter_names,
+    source_of_errors,
+)
 from rotor.quantum.estimates.limits import all_limits, limit_facts
-from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.solve import solve_levels
 from rotor.requests.budget import ErrorBudget, ErrorTerm

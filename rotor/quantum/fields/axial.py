@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet, along
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldOperator, FieldSpace, FreeLevels, Magnet, along
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.symmetric_top_elements import coupling, space_factor
 

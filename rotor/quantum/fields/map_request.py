@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
-from rotor.quantum.fields.operators import Contraction, FieldOperator
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldOperator, FieldSpace
 from rotor.quantum.fields.solved_space import field_space
 from rotor.quantum.fields.solver import Matrix, Terms
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.quantum.effect import Moment
-from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
+from rotor.quantum.fields.blocks import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Connections, Levels, SolvedBlock
 from rotor.quantum.reduced import connections, no_elements
 
@@ -73,8 +73,8 @@ class ReducedElements:
         """`connections` of ½ Σ g_ij {Φ_i, N_j} in each state, and of g_I I of the spins."""
         from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of
         from rotor.quantum.spins.many_f_lines import connections_of, connections_of_stacks, spin_moments
-        from rotor.quantum.spins.operators import EVERY_STATE, CosinesWithN, Scalar
         from rotor.quantum.spins.rotor import Piece
+        from rotor.quantum.spins.scheme import EVERY_STATE, CosinesWithN, Scalar
 
         first = self.blocks[0]
         if first.moments is not None or (first.spins is not None and first.spins.rotor.moments is not None):

@@ -30,10 +30,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.connected import coloured_components, connected_parts
+from rotor.quantum.blocks import coloured_components, connected_parts
 from rotor.quantum.fields.axial import AxialSpace, axial_levels
-from rotor.quantum.fields.blocks import BEFORE_J, FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
+from rotor.quantum.fields.blocks import (
+    BEFORE_J,
+    Contraction,
+    FieldBlock,
+    FieldOperator,
+    FieldSpace,
+    FreeLevels,
+    Key,
+    Magnet,
+)
 from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels

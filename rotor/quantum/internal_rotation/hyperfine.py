@@ -34,9 +34,8 @@ from rotor.quantum.internal_rotation.terms import Axes
 from rotor.quantum.levels import Levels, SolvedBlock, placed
 from rotor.quantum.spins.blocks import rotor_plan
 from rotor.quantum.spins.levels import solved_blocks, within_n
-from rotor.quantum.spins.operators import Cosines, CosinesWithN
 from rotor.quantum.spins.rotor import Terms, valued_terms
-from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
+from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Scheme, SpinTerm, scheme_of
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants
 

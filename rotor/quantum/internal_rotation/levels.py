@@ -28,7 +28,7 @@ from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesL
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
-from rotor.quantum.spins.operators import Rotor
+from rotor.quantum.spins.scheme import Rotor
 from rotor.quantum.tensors import BodyTensor, Tensors
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species

@@ -28,8 +28,7 @@ from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
 from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes, products_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_x, j_y, j_z
-from rotor.quantum.operators.torsion import cosine, p_alpha, sine
-from rotor.quantum.torsion import TorsionalPotential
+from rotor.quantum.torsion import TorsionalPotential, cosine, p_alpha, sine
 from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS, PAIRS, sigma_species
 
 AXES = (j_z(), j_x(), j_y())  # P along a, b, c

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.labelled import Elements
 from rotor.quantum.blocks import FunctionBlocks, connected_blocks, elements_by_blocks, expectations
+from rotor.quantum.dominated import dominated_states, is_dominated
 from rotor.quantum.internal_rotation.contracted import Product, Terms
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
@@ -25,7 +26,6 @@ from rotor.quantum.internal_rotation.labels import (
 )
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import Operator
-from rotor.quantum.solvers.dominated import dominated_states, is_dominated
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.frames import frame_along
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_squared, j_x, j_y, j_z, ladder, sum_of_powers
-from rotor.quantum.operators.torsion import cosine, p_alpha, sine
+from rotor.quantum.torsion import cosine, p_alpha, sine
 from rotor.tops.internal_rotation import BARRIERS, NAMED, SPELLED
 from rotor.tops.operators import Operators, distortion_terms
 

@@ -36,11 +36,10 @@ from rotor.quantum.spins.blocks import (
 )
 from rotor.quantum.spins.contraction import Contracted
 from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_by_number, groups_of, hamiltonians
-from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import labels_by_shares, names_of_parts, over_functions
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import Exist
-from rotor.quantum.spins.scheme import scheme_of
+from rotor.quantum.spins.scheme import AxialState, scheme_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -30,9 +30,9 @@ from rotor.quantum.spins.blocks import Shared, SpinFunctions
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, padded_vectors, stacks_of
 from rotor.quantum.spins.many_f import Coefficients, Frame, Group, Tables, between, coefficients_by_f, tables_of
 from rotor.quantum.spins.many_f_lines import groups_of_blocks
-from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.pattern_tables import couplings_by_f
 from rotor.quantum.spins.rotor import ALONE, Channels, Piece, parameter_channels
+from rotor.quantum.spins.scheme import AxialState
 from rotor.quantum.wang.wang_matrix import diagonal_elements
 
 if TYPE_CHECKING:

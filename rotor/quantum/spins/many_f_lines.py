@@ -41,10 +41,9 @@ from rotor.quantum.spins.many_f import (
     tables_of,
     write_between,
 )
-from rotor.quantum.spins.operators import Cosines
 from rotor.quantum.spins.pattern_tables import column_tensors, tensors_by_f
 from rotor.quantum.spins.rotor import Piece
-from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.scheme import Cosines, Scheme
 from rotor.quantum.tensors import Tensors, rank_of
 
 # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.wang_functions import BetweenStates, WangFunctions
 from rotor.quantum.operators.algebra import Operator, change_of
-from rotor.quantum.spins.operators import (
+from rotor.quantum.spins.scheme import (
     ByElements,
     BySpecies,
     Cosines,

@@ -81,16 +81,12 @@ def _species(j: int, first_k: int, sign: int, axes: str) -> str:
     return _parity(character["a"]) + _parity(character["c"])
 
 
-def character(block: WangBlock, axis: str) -> int:
-    """Character, 1 or -1, under a half turn about a, b or c.
+def character(species: str, axis: str) -> int:
+    """Character, 1 or -1, of the blocks of a species under a half turn about a, b or c.
 
-    >>> [character(WangBlock(1, "eo", 0, 1, 1), axis) for axis in "abc"]
+    >>> [character("eo", axis) for axis in "abc"]
     [1, -1, -1]
     """
-    return _character(block.species, axis)
-
-
-def _character(species: str, axis: str) -> int:
     under_a, under_c = (1 if parity == "e" else -1 for parity in species)
     return {"a": under_a, "b": under_a * under_c, "c": under_c}[axis]
 
@@ -106,7 +102,7 @@ def factors_of_pairs(pairs: Collection[tuple[str, str]]) -> SpeciesFactors:
 
 def half_turn(axis: str, sign: float = 1.0) -> SpeciesFactors:
     """± the character of the bra under a half turn about a, b or c: what it multiplies an operator with from the left."""
-    return tuple((sign * _character(up, axis),) * len(SPECIES) for up in SPECIES)
+    return tuple((sign * character(up, axis),) * len(SPECIES) for up in SPECIES)
 
 
 def phase(block: WangBlock) -> complex:
@@ -170,9 +166,7 @@ def names_of(block: WangBlock, representation: str) -> tuple[NDArray[np.int64], 
     >>> names_of(WangBlock(5, "eo", 2, 1, 1), "Ir")
     (array([2]), array([3]))
     """
-    first, total = _first_of_part(block, representation)
-    ka = first + 2 * np.arange(block.size)
-    return ka, total - ka
+    return names_of_blocks([block], [block.size], representation)
 
 
 def names_of_blocks(

@@ -28,10 +28,9 @@ from rotor.checks import require_choice, require_positive
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import ELECTRIC, StarkRequest, Z, acting, checked_direction
 from rotor.quantum.fields.block_states import BlockStates, pairs_of_blocks, states_of_both_signs
-from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.blocks import Contraction, FieldBlock
 from rotor.quantum.fields.field_map import each_block, smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
-from rotor.quantum.fields.operators import Contraction
 from rotor.spectra.fields.light import Light, LightText, Vector, light_components
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table

@@ -9,7 +9,7 @@ import pytest
 from slow_matrix import body_operators, term_matrix
 
 from rotor.quantum import reductions as conversions
-from rotor.quantum.estimates.uncertainty import level_errors
+from rotor.quantum.estimates.budgets import level_errors
 from rotor.quantum.reductions import to_reduction, to_representation
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.quantum.estimates.uncertainty import known_covariance, source_of_errors
+from rotor.quantum.estimates.budgets import known_covariance, source_of_errors
 from rotor.tops.constants import Constants
 
 STEP = 1e-4  # of the estimated error, for differences

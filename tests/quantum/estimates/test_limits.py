@@ -13,8 +13,8 @@ from scipy import constants
 import rotor
 from rotor.molecules.nuclei import data_folder, isotope
 from rotor.molecules.readers.read import read_molecule
-from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.effects.spin_effect import NuclearQuadrupole
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import VIBRATION_CM, VIBRATION_POWER, model_limits, model_sizes
 from rotor.quantum.estimates.splittings import GRADIENT_MHZ_PER_BARN, GRADIENTS, splitting_nuclei

@@ -7,8 +7,7 @@ from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.zeeman import zeeman_map
 from rotor.quantum.fields import block_states
 from rotor.quantum.fields.block_states import left_out_mhz
-from rotor.quantum.fields.interpolation import improved
-from rotor.quantum.fields.solver import at_fields, solve_fields, spanned_states
+from rotor.quantum.fields.solver import at_fields, improved, solve_fields, spanned_states
 from rotor.tops.top import Top
 
 FINER_J = 12  # of the reference, beyond the J max of the map

@@ -11,8 +11,8 @@ from torsion_top import turning
 from toy_axis_power import AxisPower
 
 import rotor
-from rotor.quantum.effects.hyperfine import quadrupole_of_tensor
 from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.effects.spin_effect import quadrupole_of_tensor
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.spins import Spin

@@ -7,11 +7,11 @@ import pytest
 from direct_product import states_up_to
 from spin_field_matrices import CHI, DIPOLE, LARGEST, G, every_state, full_matrix
 
-from rotor.quantum.effects.hyperfine import quadrupole_of_tensor
+from rotor.quantum.effects.spin_effect import quadrupole_of_tensor
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.effects.zeeman import zeeman_map
-from rotor.quantum.fields.operators import Magnet
+from rotor.quantum.fields.blocks import Magnet
 from rotor.quantum.fields.solved_space import field_space
 from rotor.quantum.spins import Spin
 from rotor.tops.top import Top

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from scipy.special import obl_cv
 
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, stark_map
+from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.chains import chain_states, is_chain
 from rotor.quantum.fields.diabatic import crossings
-from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.solved_space import field_space
 from rotor.quantum.fields.solver import solve_fields, spanned_states
 from rotor.tops.top import Top

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.quantum.effects.hyperfine import quadrupole_of_tensor
+from rotor.quantum.effects.spin_effect import quadrupole_of_tensor
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.fields.field_series import field_series

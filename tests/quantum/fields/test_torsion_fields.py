@@ -8,7 +8,7 @@ import qutip
 from torsion_top import ABC, CM, DIPOLE, turning
 
 import rotor
-from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import solved_levels, solved_space
 from rotor.tops.internal_rotation import InternalRotationConstants
 

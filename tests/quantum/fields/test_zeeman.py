@@ -12,7 +12,7 @@ import rotor
 from rotor.quantum.effects.stark import StarkRequest, answer_stark, stark_map
 from rotor.quantum.effects.zeeman import ZeemanRequest, answer_zeeman, magnetic_limits, zeeman_map
 from rotor.quantum.fields import field_map, map_request
-from rotor.quantum.fields.operators import Magnet
+from rotor.quantum.fields.blocks import Magnet
 from rotor.quantum.fields.solved_space import field_space
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.tops.spins.spin_constants import SpinConstants

@@ -5,11 +5,11 @@ import pytest
 from scipy.sparse import csr_array
 
 import rotor
+from rotor.quantum.dominated import dominated_states
 from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
 from rotor.quantum.internal_rotation.levels import turning_tops
 from rotor.quantum.internal_rotation.model import model_of_principal_axes
-from rotor.quantum.solvers.dominated import dominated_states
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 ROTATION = {"A": 9e3, "B": 5e3, "C": 4e3}

@@ -13,8 +13,7 @@ from rotor.quantum.internal_rotation.levels import TorsionMoments, species_rotor
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.levels import placed
 from rotor.quantum.reduced import connections
-from rotor.quantum.spins.operators import Cosines, CosinesWithN
-from rotor.quantum.spins.scheme import Scheme, Spin, SpinTerm
+from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Scheme, Spin, SpinTerm
 from rotor.quantum.tensors import BodyTensor, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants
 

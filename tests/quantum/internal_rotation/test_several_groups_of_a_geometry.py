@@ -9,7 +9,7 @@ import pytest
 
 import rotor
 from rotor import units
-from rotor.quantum.estimates.uncertainty import known_covariance, level_errors
+from rotor.quantum.estimates.budgets import known_covariance, level_errors
 from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
 

@@ -10,9 +10,7 @@ import qutip
 from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 
 from rotor.quantum.effect import Moment, QuantumEffect
-from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-from rotor.quantum.effects.spin_rotation import SpinRotation
-from rotor.quantum.effects.spin_spin import SpinSpin
+from rotor.quantum.effects.spin_effect import NuclearQuadrupole, SpinRotation, SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.operators.algebra import half_anticommutator
@@ -20,7 +18,7 @@ from rotor.quantum.operators.rotation import direction_cosine, j_squared
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.coupling import patterns, patterns_of_total, recoupling
-from rotor.quantum.spins.operators import ByElements, CosinesWithN, Scalar
+from rotor.quantum.spins.scheme import ByElements, CosinesWithN, Scalar
 from rotor.spectra.transitions import all_transitions
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

@@ -13,10 +13,8 @@ from full_matrix_levels import solve, strengths
 from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
-from rotor.quantum.effects.hyperfine import NuclearQuadrupole, quadrupole_of_tensor
 from rotor.quantum.effects.interactions import InteractingStates
-from rotor.quantum.effects.spin_rotation import SpinRotation
-from rotor.quantum.effects.spin_spin import SpinSpin
+from rotor.quantum.effects.spin_effect import NuclearQuadrupole, SpinRotation, SpinSpin, quadrupole_of_tensor
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels

@@ -12,12 +12,10 @@ from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 from scipy.linalg import expm
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-from rotor.quantum.effects.spin_rotation import SpinRotation
-from rotor.quantum.effects.spin_spin import SpinSpin
+from rotor.quantum.effects.spin_effect import NuclearQuadrupole, SpinRotation, SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.fields.operators import Magnet
+from rotor.quantum.fields.blocks import Magnet
 from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.hyperfine_method import HyperfineMethod
 from rotor.quantum.solve import solve_levels

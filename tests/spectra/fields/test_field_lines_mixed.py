@@ -11,7 +11,7 @@ from direct_product import on_spins
 from field_matrices import contracted_vectors, rigid, rotation_function, states
 from spin_field_matrices import CHI, DIPOLE, LARGEST, full_matrix, space_cosines, states_up_to
 
-from rotor.quantum.effects.hyperfine import quadrupole_of_tensor
+from rotor.quantum.effects.spin_effect import quadrupole_of_tensor
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.spins import Spin

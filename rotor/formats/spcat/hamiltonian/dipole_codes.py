@@ -37,7 +37,7 @@ from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.effect import DEBYE_PER_BOHR_MAGNETON, Moment
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import Weight, components, direction_cosine, j_squared, j_z, weighted
-from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN
+from rotor.quantum.spins.scheme import ByElements, Cosines, CosinesWithN
 
 
 def moment_operator(typ: int, sym: int, axes: str, with_spin: bool = False, as_spcat: bool = False) -> Operator:

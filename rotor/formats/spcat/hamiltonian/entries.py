@@ -29,8 +29,16 @@ from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs, exchange_part
 from rotor.frozen import dataclass
 from rotor.quantum.effect import Coupling, Moment, QuantumEffect, State
 from rotor.quantum.spins import Scheme, Spin
-from rotor.quantum.spins.operators import EVERY_STATE, ByElements, BySpecies, Cosines, CosinesWithN, Rotor, Scalar
-from rotor.quantum.spins.scheme import SpinTerm
+from rotor.quantum.spins.scheme import (
+    EVERY_STATE,
+    ByElements,
+    BySpecies,
+    Cosines,
+    CosinesWithN,
+    Rotor,
+    Scalar,
+    SpinTerm,
+)
 from rotor.quantum.spins.stack_elements import elements_of_pair
 from rotor.quantum.wang.basis import SpeciesFactors, factors_of_pairs, wang_blocks
 from rotor.tops.operators import Operators

@@ -34,7 +34,7 @@ from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import sum_of_powers, weighted
-from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rotor, Scalar
+from rotor.quantum.spins.scheme import ByElements, Cosines, CosinesWithN, Rotor, Scalar
 
 
 class Pair(NamedTuple):

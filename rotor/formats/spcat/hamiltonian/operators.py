@@ -54,7 +54,7 @@ from rotor.quantum.operators.rotation import (
     sum_of_powers,
     with_powers,
 )
-from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
+from rotor.quantum.spins.scheme import ByElements, Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
 from rotor.quantum.tensors import spherical_components
 from rotor.tops.operators import Operators
 

@@ -28,7 +28,7 @@ from rotor.formats.spcat.hamiltonian.code_table import Digits
 from rotor.formats.spcat.hamiltonian.codes import PLURAL_NOT_YET
 from rotor.formats.spcat.text.par import Options
 from rotor.quantum.effect import Moment
-from rotor.quantum.spins.operators import BySpecies, Cosines, Vector
+from rotor.quantum.spins.scheme import BySpecies, Cosines, Vector
 from rotor.quantum.wang.basis import SpeciesFactors, half_turn
 
 AXES_OF_PHASE = {False: "cba", True: "abc"}  # axes of PHASE 1, 2, 4; the key is whether the basis is oblate

@@ -35,7 +35,7 @@ from rotor.formats.spcat.text.par import Options, Parameter
 from rotor.frozen import dataclass
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import Weight, ladders, weighted
-from rotor.quantum.spins.operators import ByElements
+from rotor.quantum.spins.scheme import ByElements
 
 
 @dataclass(frozen=True)

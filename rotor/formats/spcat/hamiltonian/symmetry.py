@@ -16,7 +16,7 @@ from rotor.formats.spcat.hamiltonian.code_table import TURNS, Symmetry
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, as_matrix
 from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions
-from rotor.quantum.spins.operators import Cosines, CosinesWithN
+from rotor.quantum.spins.scheme import Cosines, CosinesWithN
 
 
 def l_values(states: Sequence[StateOptions], pairs: Sequence[Pair]) -> dict[int, int]:

@@ -36,11 +36,8 @@ from rotor.formats.spcat.hamiltonian.code_table import (
 from rotor.formats.spcat.hamiltonian.codes import AXES, FIXED, basis_axes, code_factors, is_oblate
 from rotor.formats.spcat.model import option_line
 from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile
-from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-from rotor.quantum.effects.spin_rotation import SpinRotation
-from rotor.quantum.effects.spin_spin import SpinSpin
-from rotor.quantum.spins.operators import Cosines, CosinesWithN
-from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
+from rotor.quantum.effects.spin_effect import NuclearQuadrupole, SpinRotation, SpinSpin
+from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Scheme, SpinTerm, scheme_of
 from rotor.tops.constants import Constants
 from rotor.tops.parameter_names import ParameterName, parse_name
 from rotor.tops.spins.spin_constants import SpinConstants

@@ -33,7 +33,7 @@ def half_turn(representation: str, axis: str) -> np.ndarray:
             function = np.zeros(2 * J + 1)
             function[J - k] = block.sign
             function[J + k] = 1.0
-            turn += character(block, axis) * np.outer(function, function) / (function @ function)
+            turn += character(block.species, axis) * np.outer(function, function) / (function @ function)
     return turn
 
 

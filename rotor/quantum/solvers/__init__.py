@@ -1,1 +1,0 @@
-"""Eigenvalue solvers: they see matrices, never what these stand for."""
