@@ -206,7 +206,7 @@ def test_a_table_of_species_is_read_once_for_all_catalogues_beside_it(call, fold
     catdir._read_once.cache_clear()
     read = []
     monkeypatch.setattr(catdir, "read_catdir", lambda file: read.append(file) or read_catdir(file))
-    assert call("catalogue", "add", str(folder / "cats"), "--catalogue", "lines.rotorcat")[0] == 0
+    assert call("catalogue", "add", str(folder / "cats"), "--catalogue", str(folder / "once.rotorcat"))[0] == 0
     assert len(read) == 1
     (folder / "cats" / "catdir.cat").write_text(CATDIR.replace("XYZ", "XYV"))
     assert catdir.catdir_beside(folder / "cats" / "c099501.cat")[99501].name == "XYV"
