@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -189,14 +189,14 @@ class BondRotation:
         return others[0], self.first, self.last, others[1]
 
 
-def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:
-    """The rotation about a bond, named by its atoms (from 1), such as "1-2".
+def bond_rotation(molecule: Molecule, bond: str | Sequence[int]) -> BondRotation:
+    """The rotation about a bond, named by its atoms (from 1), such as "1-2" or (1, 2).
 
     Parameters
     ----------
     molecule : Molecule
-    bond : str
-        The atom of the frame, a hyphen, the atom of the group that turns.
+    bond : str or two int
+        The atom of the frame and the atom of the group that turns, with a hyphen between them in a text.
 
     Returns
     -------
@@ -231,23 +231,38 @@ def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:
     return BondRotation(molecule, first, last, np.array(sorted(top)), np.array(sorted(frame)))
 
 
-def turning_bonds(molecule: Molecule) -> Iterator[str]:
-    """The bonds about which `bond_rotation` turns a group, by their atoms.
+def bond_text(bond: str | Sequence[int]) -> str:
+    """The text of a bond given as a text or as two numbers; ValueError for anything else.
+
+    >>> bond_text((1, 2))
+    '1-2'
+    """
+    if isinstance(bond, str):
+        return bond
+    whole = isinstance(bond, Sequence) and all(isinstance(n, int) and not isinstance(n, bool) for n in bond)
+    if not whole or len(bond) != 2:
+        raise ValueError(f"{bond!r}: expected two atom numbers, such as 1-2")
+    return f"{bond[0]}-{bond[1]}"
+
+
+def turning_bonds(molecule: Molecule) -> Iterator[tuple[int, int]]:
+    """The bonds about which `bond_rotation` turns a group, by the numbers of their atoms from 1.
 
     >>> import rotor
     >>> list(turning_bonds(rotor.read("CH3CHO").molecule))
-    ['2-4 (C-C)']
+    [(2, 4)]
     """
     for first, neighbours in enumerate(bonded_atoms(molecule)):
         for last in neighbours[neighbours > first].tolist():
             with suppress(ValueError):
-                bond_rotation(molecule, f"{first + 1}-{last + 1}")
-                yield f"{first + 1}-{last + 1} ({molecule.symbols[first]}-{molecule.symbols[last]})"
+                bond_rotation(molecule, (first + 1, last + 1))
+                yield first + 1, last + 1
 
 
-def _numbers(molecule: Molecule, bond: str) -> tuple[int, int]:
+def _numbers(molecule: Molecule, bond: str | Sequence[int]) -> tuple[int, int]:
+    """Two atoms from 0; ValueError for anything else than two different atoms of the molecule."""
     count = len(molecule.symbols)
-    match = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", bond)
+    match = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", bond_text(bond))
     if match is None:
         raise ValueError(f"{bond!r}: expected two atom numbers, such as 1-2")
     first, last = int(match[1]), int(match[2])

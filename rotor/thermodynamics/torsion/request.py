@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_top
-from rotor.molecules.bond_rotation import BondRotation, bond_rotation, turning_bonds
+from rotor.molecules.bond_rotation import BondRotation, bond_rotation, bond_text, turning_bonds
 from rotor.molecules.bond_scan import MMFF, POINTS, BondScan
 from rotor.quantum.bond_torsion import BondTorsion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
 from rotor.requests.fill import within
 from rotor.requests.knob import Knob, Measure, with_whole
-from rotor.requests.readers import Custom, Grid, Quantity, Text, Whole
+from rotor.requests.readers import Custom, Grid, Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.thermodynamics.torsion.hindered_rotor import HinderedRotorFunctions, hindered_rotor_functions
 from rotor.thermodynamics.torsion.potential import (
@@ -65,15 +65,15 @@ ANGLES = Knob(
 class TorsionRequest:
     """The rotation about a bond of a molecule; all fields are checked when the request is made.
 
-    top: with a geometry. bond: atoms i-j, counted from 1; those behind j turn. potential: "V3=400 V6=-10 cm-1", "table", "mmff", the name
+    top: with a geometry. bond: atoms "i-j" or (i, j), from 1; j turns. potential: "V3=400 V6=-10 cm-1", "table", "mmff", the name
     of an ASE calculator, or (in Python) a TorsionalPotential in MHz or a calculator. points: angles of a scan per turn. vmax: highest
     torsional level. temperatures_k: of the thermodynamic functions. classical_k: temperature of a classical gas of `molecules`,
     propagated for `duration_ps`; None: no gas.
     """
 
     top: Top
-    bond: str = declared(
-        "", Text(metavar="I-J"), "Bond between atoms I-J, counted from 1; the group behind J turns", "observables.bond",
+    bond: str | Sequence[int] = declared(
+        "", Custom(bond_text, metavar="I-J"), "Bond between atoms I-J, counted from 1; the group behind J turns", "observables.bond",
         common=True, example="1-2",
     )  # fmt: skip
     potential: Any = declared(
@@ -109,6 +109,8 @@ class TorsionRequest:
     def __post_init__(self) -> None:
         require_top(self.top)
         check_fields(self)
+        with within("bond"):
+            object.__setattr__(self, "bond", bond_text(self.bond))
         if self.top.molecule is None:
             raise ValueError("bond: constants alone have no bonds; give a molecule with its geometry")
         if not self.bond:
@@ -135,9 +137,11 @@ def _only_bond(molecule: Molecule) -> str:
     """The bond about which groups turn, "1-2"; ValueError unless it is the only one."""
     bonds = list(islice(turning_bonds(molecule), MOST_BONDS))
     if len(bonds) != 1:
-        turn = f"groups turn about {', '.join(bonds)}" if bonds else "nothing turns about any bond of this molecule"
+        symbols = molecule.symbols
+        texts = [f"{first}-{last} ({symbols[first - 1]}-{symbols[last - 1]})" for first, last in bonds]
+        turn = f"groups turn about {', '.join(texts)}" if texts else "nothing turns about any bond of this molecule"
         raise ValueError(f"bond: none is named; give two atom numbers, such as 1-2; {turn}")
-    return bonds[0].split()[0]
+    return "{}-{}".format(*bonds[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

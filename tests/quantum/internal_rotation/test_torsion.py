@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import i0e, mathieu_a, mathieu_b
 
+import rotor
 from rotor import units
 from rotor.molecules.bond_rotation import bond_rotation
 from rotor.molecules.bond_scan import mmff_calculator, relaxed_scan
@@ -378,3 +379,15 @@ def test_a_bond_needs_a_geometry():
         TorsionRequest(Top.from_constants("B=3 GHz"), "1-2")
     with pytest.raises(ValueError, match="bond: none is named"):
         TorsionRequest(Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]])))
+
+
+@pytest.mark.parametrize("bond", [(1, 2), [1, 2], "1-2"])
+def test_a_bond_is_a_text_or_two_numbers(bond):
+    answer = rotor.torsion(rotor.read("C2H6"), bond=bond, potential="V3=1013 cm-1", vmax=0)
+    assert answer.facts()["bond"] == "1-2"
+
+
+@pytest.mark.parametrize("bond", [(1,), (1, 2, 3), (1.0, 2), (True, 2), 12])
+def test_what_is_no_pair_of_atoms_is_refused(bond):
+    with pytest.raises(ValueError, match=r"bond: .*expected two atom numbers, such as 1-2"):
+        rotor.torsion(rotor.read("C2H6"), bond=bond, potential="V3=1013 cm-1")
