@@ -9,6 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# the first example may compile, and other workers may have the processor
+settings.register_profile("rotor", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("rotor")
 
 # before numpy is loaded: threads of BLAS wait for each other where other workers have the cores
 os.environ.setdefault("OMP_NUM_THREADS", "1")

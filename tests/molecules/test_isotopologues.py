@@ -256,7 +256,7 @@ def test_scaled_distortion_is_near_that_of_the_force_field(changes):
 
 
 @given(st.floats(1.0, 3.0), st.sampled_from(["1=13C", "2=18O", "1=13C,2=17O", "1=14C"]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_diatomics_scale_exactly(distance, changes):
     """B goes as 1/μ, D as 1/μ², whatever B and D are (Dunham 1932)."""
     atoms = Molecule(("C", "O"), [[0, 0, 0], [0, 0, distance]])

@@ -37,7 +37,7 @@ def test_every_level_is_found_by_its_quantum_numbers(kind):
 
 
 @given(st.lists(st.integers(0, 30), min_size=1, max_size=20))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_rows_of_mixed_labels_are_rows_or_minus_one(values):
     levels = solve_levels(Top.from_constants("A=9 B=5 GHz"), 12)
     k = np.array(values) // 2

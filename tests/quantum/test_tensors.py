@@ -194,7 +194,7 @@ def test_components_of_a_matrix_are_coupled_vectors(rank, representation):
 
 
 @given(seed=st.integers(0, 10**6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_components_keep_lengths(seed):
     """Σ_K Σ_q |T^K_q|² = Σ T_gh²."""
     matrix = np.random.default_rng(seed).normal(size=(3, 3))
@@ -231,7 +231,7 @@ def test_closed_forms_are_three_j(rank):
 
 
 @given(j=st.integers(0, 200), rise=st.integers(-2, 2), rank=st.sampled_from([1, 2]), q=st.integers(-2, 2))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_couplings_squared_add_up(j, rise, rank, q):
     """Σ_k c² = (2J+1)(2J'+1)/(2K+1) wherever there is one."""
     j_up, k = j + rise, np.arange(-j, j + 1)

@@ -55,7 +55,7 @@ def test_which_momenta_commute_with_the_hamiltonian():
 
 
 @given(st.lists(st.floats(1.0, 1e6), min_size=3, max_size=3, unique=True))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_levels_of_one_and_two(constants):
     """J = 1: A+B, A+C, B+C; J = 2: 4A+B+C, A+4B+C, A+B+4C and 2(A+B+C) ± 2√((B-C)² + (A-C)(A-B))."""
     c, b, a = sorted(constants)

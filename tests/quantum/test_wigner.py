@@ -65,7 +65,7 @@ def test_symbols_are_sympy_s(kind, arguments, value):
 
 
 @given(arguments=three_j_arguments(top=24))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_three_j_is_qutip_s(arguments):
     j1, j2, j3, m1, m2, m3 = arguments
     slow = (-1) ** round(j1 - j2 - m3) / math.sqrt(2 * j3 + 1) * qutip.clebsch(j1, j2, j3, m1, m2, -m3)  # DLMF 34.1.1
@@ -114,7 +114,7 @@ def test_six_j_are_orthogonal_at_1000():
 
 
 @given(arguments=three_j_arguments(), order=st.permutations(range(3)))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_columns_of_three_j_change_places(arguments, order):
     columns = np.reshape(arguments, (2, 3))
     odd = list(order) in ([0, 2, 1], [1, 0, 2], [2, 1, 0])
@@ -126,7 +126,7 @@ def test_columns_of_three_j_change_places(arguments, order):
 
 
 @given(arguments=six_j_arguments(), order=st.permutations(range(3)))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_symmetries_of_six_j(arguments, order):
     """Columns change places, two columns turn upside down, and Regge's first symmetry (DLMF 34.5.9)."""
     upper, lower = np.reshape(arguments, (2, 3))

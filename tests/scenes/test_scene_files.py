@@ -39,7 +39,7 @@ def test_a_file_is_read_as_it_was_written(tmp_path):
     assert read_scene(tmp_path / "s.toml") == scene
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.floats(allow_nan=False, allow_infinity=False), st.text(st.characters(exclude_categories=["Cs"]), max_size=20))
 def test_every_number_and_text_comes_back(number, text):
     scene = make_scene("stark", molecule={"source": text}, conditions={"field": [number]}, title=text)

@@ -159,7 +159,7 @@ def test_strengths_are_those_of_full_matrices(representation):
 
 
 @given(values=st.tuples(*[st.floats(1.0, 20.0)] * 3), tensor=st.lists(st.floats(-3, 3), min_size=6, max_size=6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_sum_over_final_states(values, tensor):
     """Σ_f S = (2J+1) γ² for every state of any asymmetric top and any tensor, with the elastic term."""
     c, b, a = sorted(values)

@@ -66,7 +66,7 @@ def test_area_is_the_integrated_absorption(lines, shape):
     assert area == pytest.approx(lines.intensity_nm2_mhz.sum(), rel=2.5e-3)  # what resolving_grid promises
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(outside=st.floats(1e-6, 0.3))
 def test_truncation_stays_below_its_bound(lines, outside):
     line = lines.where([5])

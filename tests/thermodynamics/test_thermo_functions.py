@@ -237,7 +237,7 @@ def test_distortion_correction_is_that_of_the_sum(rigid_text, distorted):
     st.floats(0.3, 300.0),
     st.sampled_from(["", "KaKc"]),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_derivatives_of_ln_q(a, b_over_a, c_over_b, t_over_theta, rule):
     """U/RT = d ln Q/d ln T and C_v = dU/dT by differences, whatever the asymmetric top."""
     weights = {"ee": 1, "eo": 3, "oe": 3, "oo": 1} if rule else None

@@ -55,7 +55,7 @@ def shaken(molecule: Molecule, seed: int) -> Molecule:
 
 
 @given(st.sampled_from([WATER, FORMIC, CHIRAL, AMMONIA, METHANE]), st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_orientation_place_and_order_change_nothing(molecule, seed):
     first, other = Top.from_molecule(molecule), Top.from_molecule(shaken(molecule, seed))
     assert other.kind == first.kind
@@ -160,7 +160,7 @@ def test_single_atom_and_bad_dipole():
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_polarizability_turns_along(seed):
     """In principal axes nothing depends on how the molecule came, but for the signs of axes that symmetry leaves free."""
     alpha = np.array([[1.415, 0, 0], [0, 1.528, 0], [0, 0, 1.468]])

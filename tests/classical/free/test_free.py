@@ -170,7 +170,7 @@ moments3 = arrays(np.float64, 3, elements=st.floats(0.05, 5.0))
 vectors = arrays(np.float64, 3, elements=st.floats(-3.0, 3.0).map(lambda x: 0.0 if abs(x) < 1e-100 else x))
 
 
-@settings(deadline=None, max_examples=150)  # the first example may compile
+@settings(max_examples=150)
 @given(moments3, vectors, st.floats(-1e4, 1e4))
 def test_keeps_what_a_free_motion_keeps(moments, momentum, t):
     m, q = free_motion(moments, momentum).at(t)

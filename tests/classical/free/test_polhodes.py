@@ -29,7 +29,7 @@ moments_of_a_body = st.permutations((0, 1, 2)).flatmap(
 )
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(moments_of_a_body, st.floats(0.02, 0.98))
 def test_polhodes_lie_on_sphere_and_ellipsoid(moments, fraction):
     inverse = 1.0 / moments

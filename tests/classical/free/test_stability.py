@@ -3,7 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -118,7 +118,6 @@ def test_published_periods(moments, omega, period):
     assert stab.tumbling_period(moments, np.array(moments) * omega) == pytest.approx(period, rel=1e-12)
 
 
-@settings(deadline=None)  # the first example may compile
 @given(bodies, st.floats(1e-9, 1e-5), st.floats(1e-9, 1e-5))
 def test_asymptotic_period_close_to_the_intermediate_axis(moments, a, c):
     momentum = np.array([a, 1.0, c])
@@ -128,7 +127,6 @@ def test_asymptotic_period_close_to_the_intermediate_axis(moments, a, c):
         assert stab.asymptotic_period(moments, momentum) == pytest.approx(float(exact.period), rel=1e-7)
 
 
-@settings(deadline=None)  # the first example may compile
 @given(bodies, st.tuples(*[st.floats(-2.0, 2.0)] * 3).filter(lambda m: min(abs(x) for x in m) > 0.01))
 def test_period_of_both_routes(moments, momentum):
     ratio = abs(momentum[2] / moments[2]) / abs(momentum[0] / moments[0]) / stab.separatrix_ratio(moments)

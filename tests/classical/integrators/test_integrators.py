@@ -160,7 +160,7 @@ def test_a_linear_rotor_moves_as_the_free_motion(method):
     assert end.momentum[-1, 1] == pytest.approx(0.0, abs=1e-10)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.floats(0.5, 2.0), min_size=3, max_size=3), st.lists(st.floats(-1, 1), min_size=3, max_size=3))
 def test_exact_moser_veselov_is_the_free_motion(moments, momentum):
     momentum = np.round(momentum, 12) + np.array([0.0, 0.0, 1e-3])

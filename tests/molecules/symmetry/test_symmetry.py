@@ -253,7 +253,7 @@ def test_tolerance_is_relative_and_stated():
 # Algebra
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     name=st.sampled_from(["H2O", "NH3", "C2H4", "C3H4_D2d", "CH4", "C6H6", "CO2", "N2H4", "C2H6", "CH3O", "BF3"]),
     seed=st.integers(0, 2**32 - 1),

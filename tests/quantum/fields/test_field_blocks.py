@@ -44,7 +44,7 @@ def energies(space, terms, jmax: int) -> np.ndarray:
 
 
 @given(k=st.integers(-6, 6), m=st.integers(-6, 6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_cosine_is_a_rotation_function(k, m):
     j = np.arange(max(abs(k), abs(m)), 9)
     basis = [(int(value), k, m) for value in j]

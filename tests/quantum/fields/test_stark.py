@@ -115,7 +115,7 @@ def test_second_order_coefficients_of_ocs(j, m, coefficient):
 
 
 @given(k=st.integers(-3, 3), m=st.integers(1, 3))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 def test_first_order_of_a_symmetric_top(k, m):
     """dW/dE = -μ KM/[J(J+1)]; the slope of (K, M) and that of (-K, M) are opposite."""
     stark = stark_map(CH3CN, [0.0], j_highest=3, m_values=(m,))
@@ -338,7 +338,7 @@ def test_stark_maps_refuse_bad_input(change, message):
 
 
 @given(seed=st.integers(0, 10**6), size=st.integers(4, 24))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_chains_have_the_states_of_the_full_matrix_or_none(seed, size):
     """Random tridiagonal matrices, levels as close as they fall: LAPACK's energies, vectors without residual, or no answer."""
     rng = np.random.default_rng(seed)

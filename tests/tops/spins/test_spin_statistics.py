@@ -108,7 +108,7 @@ def test_states_of_an_inverting_molecule():
     assert statistical_weights(partly, inversion="antisymmetric").to_mapping() == {"ee": 3, "eo": 3, "oe": 1, "oo": 1}
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(label=st.sampled_from(["NH3", "PH3", "ND3"]), j=st.integers(0, 9))
 def test_both_states_of_the_doublet_add_up_to_the_unresolved_one(label, j):
     k = np.arange(j + 1)
@@ -250,7 +250,7 @@ def test_against_the_sum_over_all_spin_functions(label, jmax):
 # Algebra
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(label=st.sampled_from([s for s in SPECIES if not SPECIES[s].inversion and "C60" not in s]), j=st.integers(0, 40))
 def test_all_levels_of_one_j_hold_the_right_number_of_spin_functions(label, j):
     """Σ over levels of the weight = Σ_R χ_J(R) f(R) / Σ 1, whatever the rule, up to the divisor taken out."""
@@ -288,7 +288,7 @@ def test_irreps_fill_every_j(group, dimensions):
     assert np.array_equal(np.dot(dimensions, irreps_in_j(j, IRREPS[group])), 2 * j + 1)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     label=st.sampled_from(["H2O", "C2H4", "allene", "BF3", "C6H6", "CH4", "H2O2", "NH3, lower of the doublet"]),
     seed=st.integers(0, 2**32 - 1),
