@@ -167,7 +167,12 @@ def _barriers(top: Top, group: MethylGroup, calculator: Any, given: str | None) 
     if calculator is not None:
         barriers, scan = _scanned(top, group, calculator)
         error, origin = scan.relative_error, f"of a {scan.source}, {scan.doubt or 'whose error is not known'}"
-    elif group.barrier is None or not group.rotor.barrier_mhz:
+    elif group.barrier is not None and not group.rotor.barrier_mhz:
+        raise ValueError(
+            f"internal rotation of {top.name or 'this top'}: a methyl group on a ring of six may have no threefold barrier (toluene: V6 = "
+            "4.88 cm-1 alone); give both (geometry V3=0cm-1 V6=4.88cm-1), where weights of nuclei that the ring exchanges are left out"
+        )
+    elif group.barrier is None:
         raise ValueError(
             f"internal rotation of {top.name or 'this top'}: no similar molecule with a threefold barrier is known; give V3 (geometry "
             "V3=400cm-1), or scan it"

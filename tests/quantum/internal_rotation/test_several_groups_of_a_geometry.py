@@ -85,6 +85,7 @@ def test_a_given_value_replaces_that_of_the_geometry_and_is_exact():
         ("CC(C)(C)C", "", "4 methyl groups turn; up to three"),
         ("CC(=O)C", "5=2H,6=2H,7=2H", "CH3 and CD3 turn"),
         ("C=C", "", "no methyl group turns"),
+        ("Cc1ccccc1", "", r"no threefold barrier .toluene: V6 = 4.88 cm-1 alone.; give both"),
     ],
 )
 def test_groups_that_cannot_be_computed_are_named(smiles, isotopes, reason):
