@@ -281,8 +281,10 @@ class SpectrumAnswer(TextOf):
 
     @property
     def typical_j(self) -> int:
-        """The J at which effects are compared: the most populated J within the list."""
-        return min(populated_j(self.lines.top, self.lines.temperature_k), max(self.lines.jmax, 1))
+        """The J at which effects are compared: the most populated J, or the highest of the listed lines if that is lower."""
+        lines = self.lines
+        highest = int(lines.levels.rotational[lines.upper].max()) if len(lines) else lines.jmax
+        return min(populated_j(lines.top, lines.temperature_k), max(highest, 1))
 
     @property
     def why_no_lines(self) -> str:

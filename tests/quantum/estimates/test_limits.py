@@ -242,6 +242,13 @@ def test_the_size_of_neglected_distortion_names_its_levels(call):
     assert re.search(r"\(centrifugal distortion of order J\^6 at J = \d+\)", out)
 
 
+def test_effects_are_compared_at_the_j_of_the_listed_lines(call):
+    """A single line of J = 4 had the neglected distortion of J = 24, the most populated J: 22 MHz."""
+    out = call("spectrum", "HCONH2", "--range", "84.5:84.6GHz")[1]
+    assert "effects   at J = 4: " in out
+    assert "left out about 2.9 MHz (nuclear quadrupole" in out
+
+
 @pytest.mark.parametrize(
     ("command", "said"),
     [
