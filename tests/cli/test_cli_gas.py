@@ -160,7 +160,7 @@ def test_tables_of_the_test_itself(folder):
         (("water", "--confidence", "1"), "--confidence: 1: expected a number between 0 and 1"),
         (("water", "--temperature", "0"), "--temperature: 0: expected a finite number above 0 K"),
         (("water", "--times", "5:1:3"), "--times: '5:1:3': the range must rise"),
-        (("water", "--times", "0:1:200000"), "at most 100000 times"),
+        (("water", "--times", "0:1:200000"), "at most 100000 numbers"),
         (("water", "--plot", "x.txt"), "--plot x.txt: the name must end in .png or .pdf or .svg"),
         (("water", "--constants", "B=1"), "either a source or --constants"),
         ((), "either a source or --constants"),
