@@ -1,6 +1,6 @@
 """Spectra as columns of text: two or three numbers in each line, separated by blanks or commas, after any heading.
 
-Read are frequency (or velocity) and intensity, and the noise from a third column where the heading calls it so. Units stand in the heading:
+The columns are frequency (or velocity), intensity and, where the heading names it, noise. Units stand in the heading:
 `#xLabel: frequency [MHz]` and `#yLabel: (Jy/beam) Mean` as CASA and CASSIS write them, or a line of names such as
 `frequency_mhz,intensity_k`, `freq (GHz)  T (K)` or `f/GHz, T/K`. Without a heading the choices of the user count, MHz and K by default,
 with a note.
