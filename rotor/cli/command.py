@@ -347,7 +347,7 @@ def scene_writer(outcome: Outcome, typed: Mapping[str, Any]) -> Any:
 
 def note(text: str) -> None:
     """Print a remark on standard error."""
-    clear = "\r\x1b[2K" if sys.stderr.isatty() else ""  # of the time of work that goes on
+    clear = "\r\x1b[2K" if sys.stderr.isatty() else ""  # erases the line with the elapsed time
     print(f"{clear}note:", text, file=sys.stderr)
 
 

@@ -22,15 +22,8 @@ from rotor.units import DEBYE_PER_E_ANGSTROM, QUADRUPOLE_MHZ_PER_BARN_AU
 _UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 ELECTRONIC = ("even", "odd")  # parity of the electronic state under half turns
-SIGMA_MINUS = (
-    "B",
-    "O",
-    "Si",
-    "S",
-    "Ge",
-    "Se",
-    "Te",
-)  # X2 with the ground state 3Σg- (K. P. Huber and G. Herzberg 1979)
+# X2 with the ground state 3Σg- (K. P. Huber and G. Herzberg 1979)
+SIGMA_MINUS = ("B", "O", "Si", "S", "Ge", "Se", "Te")
 FEW_ATOMS = 100  # up to which all distances are as quick as a k-d tree
 CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
 
@@ -120,7 +113,7 @@ class Molecule:
         object.__setattr__(self, "charge", int(charge))
 
     def _take_ground_state(self, symbols: list[str], charge: float) -> None:
-        """Set parity and multiplicity where the elements alone tell the electronic ground state; even otherwise."""
+        """Set parity and multiplicity where the elements alone determine the electronic ground state; even otherwise."""
         first = symbols[0]
         triplet = symbols == [first, first] and first in SIGMA_MINUS and not charge and self.multiplicity in (None, 3)
         object.__setattr__(self, "electronic", "odd" if triplet else "even")

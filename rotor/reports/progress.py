@@ -51,7 +51,7 @@ def elapsed_time(what: str) -> Iterator[None]:
 
 
 def _is_compiling() -> bool:
-    """Whether a kernel is being compiled; the compiler is not loaded for the question."""
+    """Whether a kernel is being compiled; does not load the compiler."""
     kernels = sys.modules.get("rotor.kernels")
     return kernels is not None and kernels.compilations.running > 0
 

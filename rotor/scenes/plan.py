@@ -50,9 +50,7 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     """
     checked_scene(scene)
     if scene.sweep:
-        raise ValueError(
-            "sweep: this scene has several points, and a plan is of a single one: leave the sweep out for it"
-        )
+        raise ValueError("sweep: a plan is of a single calculation; remove the sweep from the scene to plan one point")
     if is_sweep(scene, folder):
         raise ValueError("molecule: a list of molecules; a plan is of one: name a molecule of the list in its place")
     files_of(scene, out)

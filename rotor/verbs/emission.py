@@ -184,7 +184,7 @@ def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
     if not len(lines):
         why = "none is inside the range and deep enough; widen --range or lower --least-depth"
         if all(map(_is_dark, request.molecules)):
-            why = "without a dipole moment a molecule emits none"
+            why = "a molecule without a dipole moment emits none"
         yield f"no lines: {why}{range_without_unit(report.entries)}\n"
     yield _table(answer, report.shown.top_lines)
     cited = "; ".join(

@@ -362,7 +362,7 @@ _NEEDED = {
 def _fit_parts(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> Iterable[Part | None]:
     chi = f"{fit.reduced_chi_squared:.4g}, {fit.degrees_of_freedom} degrees of freedom"
     if fit.reduced_chi_squared > POOR:
-        chi += "; the model does not describe the spectrum: other species, or another start (--reject, --velocity, --width)"
+        chi += "; the model does not describe the spectrum: add species, or give other starting values (--velocity, --width) or --reject"
     yield [("fit", fit.minimum.reason), ("χ²/ν", chi)]
     yield _parameter_table(fit)
     yield record_table("what each species contributes", _NEEDED, needed, LEFT)

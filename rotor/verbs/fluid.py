@@ -110,7 +110,7 @@ class Box(SubjectKind):
             return Subject({"box": box, "box_source": "given"}, (), inputs.source or "", place.note)
         path = str(Path(place.folder) / str(file))
         if not Path(path).is_file() and not in_scene:
-            raise ValueError(f"{file}: no such file; with --molecules N a box is made of 'water' or of a model")
+            raise ValueError(f"{file}: no such file; for a new box of 'water' or of a model give --molecules N")
         try:
             values = {"box": _read(path), "box_source": file, **_equilibration(inputs, entries)}
         except ValueError as error:
@@ -160,8 +160,8 @@ def _refuse_other_model(source: str, settings: Settings) -> None:
         raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
         raise ValueError(
-            f"{source!r}: a new box is of a single model, or of 'water'; models are {', '.join(sorted(MODELS))}, "
-            "written as in 'rotor fluid argon --model argon'"
+            f"{source!r}: a new box contains 'water' or a single model; models are {', '.join(sorted(MODELS))}, "
+            "named twice, as in 'rotor fluid argon --model argon --molecules 500'"
         )
     model = find_model(settings.model)
     if source == "water" and model.symbols != ("O", "H", "H"):

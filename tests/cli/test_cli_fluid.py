@@ -122,7 +122,7 @@ def test_a_plan_counts_the_equilibration_of_a_box_that_is_made(call, folder):
         (("water", "--model", "spcf", "--molecules", "8"), "--model: 'spcf' is no model of a rigid molecule"),
         (("water", "--molecules", "0"), "--molecules"),
         (("water", "--molecules", "8", "--model", "argon"), "--model argon is not a model of water"),
-        (("benzene", "--molecules", "8"), "a new box is of a single model"),
+        (("benzene", "--molecules", "8"), "a new box contains 'water' or a single model"),
         (("water", "--density", "1"), "--density: expected with --molecules"),
         (("water", "--equilibration", "-1ps"), "--equilibration: -1ps: expected a finite number of 0 ps or more"),
         (
