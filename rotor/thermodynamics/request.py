@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
@@ -17,7 +21,7 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Custom, Grid, Quantity, Text
-from rotor.table import TextOf
+from rotor.table import Table, TextOf, counted
 from rotor.thermodynamics.electronic import ElectronicStates
 from rotor.thermodynamics.functions import (
     ThermoFunctions,
@@ -28,7 +32,7 @@ from rotor.thermodynamics.functions import (
 )
 from rotor.thermodynamics.sums.classical_limit import classical_limit, populated_j, rotational_temperatures_k
 from rotor.thermodynamics.sums.classical_onset import classical_above_if_known
-from rotor.thermodynamics.sums.level_sums import Progress
+from rotor.thermodynamics.sums.level_sums import OutOfReachError, Progress
 from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts
@@ -48,13 +52,11 @@ def _electronic(states: ElectronicStates | str) -> ElectronicStates:
 
 
 def _relative(name: str) -> Callable[[Any, Any], float]:
-    """The largest relative error of a column in percent; relative to its largest value if the column passes through 0."""
+    """The largest relative error of a column in percent, at the temperatures that have a sum."""
 
     def error(answer: Any, reference: Any) -> float:
-        import numpy as np
-
-        values, true = (np.asarray(getattr(each.functions, name)) for each in (answer, reference))
-        return 100.0 * float(np.max(np.abs(values - true) / np.maximum(np.abs(true), 1e-12)))
+        values, true = (each.table.columns[name] for each in (answer, reference))
+        return 100.0 * float(np.nanmax(np.abs(values - true) / np.maximum(np.abs(true), 1e-12)))
 
     return error
 
@@ -120,14 +122,46 @@ class ThermoRequest:
                 raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class AllTemperatures(Table):
+    """The functions at the temperatures of a request, in its order; NaN where the sum was refused."""
+
+    functions: ThermoFunctions
+    temperatures_k: Sequence[float]
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The columns of the functions."""
+        temperatures = np.array(self.temperatures_k, dtype=np.float64)
+        summed = np.isin(temperatures, self.functions.temperature_k)
+        out = {name: np.full(len(temperatures), math.nan) for name in self.functions.columns}
+        for name, column in self.functions.columns.items():
+            out[name][summed] = column
+        return out | {"temperature_k": temperatures}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Inputs of the functions."""
+        return self.functions.provenance | {"rows": len(self)}
+
+
 @dataclass(frozen=True, repr=False)
 class ThermoAnswer(TextOf):
-    """The functions of a request, with notes and errors."""
+    """The functions of a request, with notes and errors.
 
-    shown = "functions"
+    functions: at the temperatures at which the sum can be computed. refused: why it cannot, by the other temperatures (K).
+    """
+
+    shown = "table"
 
     request: ThermoRequest
     functions: ThermoFunctions
+    refused: Mapping[float, str] = field(default_factory=dict)
+
+    @property
+    def table(self) -> Table:
+        """The functions at all temperatures; NaN at refused ones."""
+        return AllTemperatures(self.functions, self.request.temperatures_k) if self.refused else self.functions
 
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
@@ -152,7 +186,24 @@ class ThermoAnswer(TextOf):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A note on electronic functions of a linear radical that its spin degeneracy does not count."""
+        """Temperatures without a sum, and electronic functions of a linear radical that its spin degeneracy does not count."""
+        return (*self._refusal_notes, *self._electronic_notes)
+
+    @property
+    def _refusal_notes(self) -> tuple[str, ...]:
+        """The reason at the first temperature without a sum, and which others have none."""
+        if not self.refused:
+            return ()
+        first, *others = sorted(self.refused)
+        also = (
+            f"; nor is there a sum at {counted(len(others), 'other temperature')} up to {others[-1]:g} K"
+            if others
+            else ""
+        )
+        return (self.refused[first] + also,)
+
+    @property
+    def _electronic_notes(self) -> tuple[str, ...]:
         gas, top = self.functions.gas, self.functions.top
         doublet = gas is not None and self.request.electronic is None and gas.electronic.degeneracies == (2,)
         if not doublet or top.kind != "linear":
@@ -184,22 +235,35 @@ class ThermoAnswer(TextOf):
             "pressure_bar": gas.pressure_bar if gas is not None else None,
             "electronic": gas.electronic.text if gas is not None else None,
             "hyperfine": functions.hyperfine,
+            "refused": [{"temperature_k": t, "reason": reason} for t, reason in self.refused.items()],
             **limit_facts(top, populated_j(top, float(functions.temperature_k.max())), self.effects),
             "errors": self.errors.as_json(),
         }
 
 
 def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> ThermoAnswer:
-    """Compute the functions of a request; ValueError if a sum over levels is refused. progress: see `level_sums`.
+    """Compute the functions of a request; ValueError if the sum is refused at all temperatures. progress: see `level_sums`.
 
     >>> from rotor.tops.top import Top
     >>> answer = answer_thermo(ThermoRequest(Top.from_constants("B=10 cm-1"), (300.0,)))
     >>> round(float(answer.functions.cv_over_r[0]), 4)  # 1 + (Θ/T)²/45
     1.0001
     """
-    functions = thermodynamic_functions(
+    temperatures, refused = request.temperatures_k, dict[float, str]()
+    while True:
+        try:
+            return ThermoAnswer(request, _functions(request, temperatures, progress), refused)
+        except OutOfReachError as error:  # species of a mixture can be refused at different temperatures
+            rest = [t for t in temperatures if t not in error.reasons]
+            if not rest:
+                raise
+            temperatures, refused = rest, refused | dict(error.reasons)
+
+
+def _functions(request: ThermoRequest, temperatures_k: Sequence[float], progress: Progress | None) -> ThermoFunctions:
+    return thermodynamic_functions(
         request.top,
-        request.temperatures_k,
+        temperatures_k,
         species=request.species,
         vibrations=request.vibrations,
         pressure_bar=request.pressure_bar,
@@ -208,4 +272,3 @@ def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> T
         progress=progress,
         effects=request.effects,
     )
-    return ThermoAnswer(request, functions)

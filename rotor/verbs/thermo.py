@@ -130,9 +130,8 @@ VERB = Verb(
     small_blocks=True,
     request=ThermoRequest,
     answer=lambda request, work: answer_thermo(request, sum_progress() if work.progress else None),
-    table=lambda answer: answer.functions,
     results=lambda answer: {
-        name: answer.functions.columns[name][-1]
+        name: answer.table.columns[name][-1]
         for name in ("temperature_k", "q_rot", "entropy_j_per_mol_k", "cv_over_r")
     },
     rows="functions",

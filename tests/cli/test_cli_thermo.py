@@ -25,7 +25,8 @@ VIBRATION_KEYS = ["q_vib", "cv_vib_over_r"]
 GAS_KEYS = ["gas_cp_j_per_mol_k", "gas_entropy_j_per_mol_k", "gas_enthalpy_j_per_mol", "gas_gibbs_j_per_mol_k"]
 KEYS = {
     "rotational_temperatures_k", "classical_above_k", "classical_tolerance", "classical_corrections", "species",
-    "species_known", "fractions", "symmetry_number_counted", "hyperfine", "spin_factor", "jmax", "relative_error", "vibrations",
+    "species_known", "fractions", "symmetry_number_counted", "hyperfine", "spin_factor", "jmax", "relative_error", "refused",
+    "vibrations",
     "pressure_bar", "electronic", "functions", "files", "errors",
 }  # fmt: skip
 
@@ -175,11 +176,29 @@ def test_wrong_input_is_one_line(call, folder, arguments, said):
 
 
 def test_beyond_the_reach_of_the_constants_there_is_no_answer(call, folder):
-    code, out, err = call("thermo", "water", "--temperature", "300,5000", "--csv", "w.csv")
+    code, out, err = call("thermo", "water", "--temperature", "4000,5000", "--csv", "w.csv")
     assert code == 1
-    assert err.startswith("error: Q(5000 K): populated levels lie beyond the reach of the distortion constants")
-    assert err.endswith("; lower the temperature, or give Q; of those asked for the sum can be had up to 300 K\n")
+    assert err.startswith("error: Q(4000 K): populated levels lie beyond the reach of the distortion constants")
     assert (out, err.count("\n"), list(folder.iterdir())) == ("", 1, [])
+
+
+def test_temperatures_beyond_the_reach_leave_the_others(call, folder):
+    """The row of a refused temperature is empty in files, and its reason is in a note; the other rows are as without it."""
+    code, out, err = call("thermo", "water", "--temperature", "10,3000,300,4000K", "--csv", "w.csv", "--json", "w.json")
+    assert (code, err.count("\n")) == (0, 1)
+    assert err.startswith("note: Q(3000 K): populated levels lie beyond the reach of the distortion constants")
+    assert err.endswith("; nor is there a sum at 1 other temperature up to 4000 K\n")
+    assert "worst at 300 K" in out
+    content = json.loads((folder / "w.json").read_text())
+    assert [refused["temperature_k"] for refused in content["refused"]] == [3000.0, 4000.0]
+    assert all("beyond the reach" in refused["reason"] for refused in content["refused"])
+    rows = content["functions"]
+    assert [row["temperature_k"] for row in rows] == [10.0, 3000.0, 300.0, 4000.0]
+    assert {value for row in rows[1::2] for name, value in row.items() if name != "temperature_k"} == {None}
+    assert (folder / "w.csv").read_text().splitlines()[2] == "3000.0,,,,,,,,"
+    call("thermo", "water", "--temperature", "10,300", "--json", "alone.json")
+    alone = json.loads((folder / "alone.json").read_text())
+    assert (rows[::2], alone["refused"]) == (alone["functions"], [])
 
 
 def test_a_temperature_far_too_high_is_refused_soon(call, folder):

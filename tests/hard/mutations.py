@@ -296,7 +296,7 @@ MUTATIONS = (
     ),
     Mutation(
         20, "rotor/thermodynamics/sums/level_sums.py",
-        "        raise OutOfReachError(refusal(t, error, at_worst) + others)", "        return",
+        "        raise OutOfReachError({t: refusal(t, error, at_worst) for t, error in pairs}, others)", "        return",
         "tests/thermodynamics/test_thermo.py::test_levels_that_distortion_does_not_serve_are_counted_with_their_error",
     ),
     Mutation(

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -60,7 +60,14 @@ Progress = Callable[[int, int], object]
 
 
 class OutOfReachError(ValueError):
-    """The levels populated at a temperature lie beyond the range of the constants or of a sum."""
+    """The levels populated at a temperature lie beyond the range of the constants or of a sum.
+
+    reasons: by refused temperature in K.
+    """
+
+    def __init__(self, reasons: Mapping[float, str], others: str = "") -> None:
+        super().__init__(next(iter(reasons.values())) + others)
+        self.reasons = reasons
 
 
 @dataclass(frozen=True)
@@ -198,12 +205,14 @@ def _last_j(top: Top, temperatures: Floats, relative_error: float) -> Floats:
 
 
 def _refuse_inexact(sums: LevelSums, kinds: int, at_worst: float) -> None:
-    """Raise ValueError for the first temperature whose estimated error exceeds `at_worst`."""
+    """Raise OutOfReachError for the temperatures whose estimated error exceeds `at_worst`."""
     worst = np.max([sums.error_q, sums.error_energy, sums.error_cv][:kinds], axis=0)
-    for t, error in zip(sums.temperatures_k[worst > at_worst].tolist(), worst[worst > at_worst].tolist(), strict=True):
-        good = sums.temperatures_k[worst <= at_worst]
+    bad = worst > at_worst
+    if bad.any():
+        good = sums.temperatures_k[~bad]
         others = f"; of those asked for the sum can be had up to {good.max():g} K" if len(good) else ""
-        raise OutOfReachError(refusal(t, error, at_worst) + others)
+        pairs = zip(sums.temperatures_k[bad].tolist(), worst[bad].tolist(), strict=True)
+        raise OutOfReachError({t: refusal(t, error, at_worst) for t, error in pairs}, others)
 
 
 def refusal(temperature_k: float, error: float, at_worst: float = AT_WORST) -> str:
