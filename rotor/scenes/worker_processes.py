@@ -32,6 +32,7 @@ _COMMON = (
     "rotor.scenes.sweep.run",
     "rotor.formats.read_write",
     "rotor.formats.tables",
+    "rotor.molecules.bonds",
     "rotor.quantum.estimates.budgets",
     "rotor.quantum.effects.of_top",
     "rotor.tops.plausible",
