@@ -125,21 +125,15 @@ class TorsionLevels(LevelModel):
     ) -> tuple[Floats, Floats]:
         """Energies and derivatives of the labels of one species."""
         levels = self._solved(part, name, model)
-        further = further_operators(model, name, chain)
+        moments = TorsionMoments(levels, model, chain, further_operators(model, name, chain))
         if self.spins is None:
-            elements = levels.functions.elements(list(further.values())) if further else None
             rows = _label_rows(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
-            values, direct = levels.energies[rows], levels.slopes(rows)
-            if elements is not None:
-                direct = np.hstack([direct, levels.slopes(rows, elements)])
+            values, direct = levels.energies[rows], levels.slopes(rows, list(moments.further.values()))
             spin_slopes: dict[str, Floats] = {}
         else:
-            moments = TorsionMoments(levels, model, chain, further)
             spins = self.spins.derivatives(named, model.frame, chain)
             values, direct, spin_slopes = _with_spins(self.spins, part, moments, self.spins.valued(named), spins)
-        count = len(model.coefficients)
-        slopes = dict(zip(model.values, (direct[:, :count] @ model.jacobian).T, strict=True))
-        slopes |= dict(zip(further, direct[:, count:].T, strict=True))
+        slopes = moments.by_quantities(direct)
         slopes |= {key: slopes.get(key, 0.0) + slope for key, slope in spin_slopes.items()}
         return values, chain.slopes(self.names, slopes, len(values))
 

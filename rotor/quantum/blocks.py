@@ -12,13 +12,13 @@ is one contraction with the eigenvectors. Eigenvectors keep their meaning withou
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Ints
 from rotor.quantum.basis.labelled import ROUND_OFF, Basis, Elements
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import Operator
@@ -75,8 +75,6 @@ def _columns(edges: Iterable[Sequence[int]], width: int) -> Ints:
     return np.array([*edges], dtype=np.int64).reshape(-1, width).T
 
 
-_AT_ONCE = 1 << 16  # numbers computed at a time, so that they stay in the cache of a core
-
 FunctionBlocks = list[tuple[Ints, LinearBlock]]  # the rows of the functions of each block, in order, and its elements
 
 
@@ -113,21 +111,6 @@ def _places(count: int, members: Sequence[Ints]) -> tuple[Ints, Ints]:
     for number, rows in enumerate(members):
         block[rows], rank[rows] = number, np.arange(len(rows))
     return block, rank
-
-
-def expectations(entries: ByBlocks, vectors: Mapping[int, NDArray[Any]], operators: int) -> Floats:
-    """Σ_p ⟨ψ_p|O|ψ_p⟩ (n, operators) of Hermitian operators; vectors: (functions, p, n) of ψ in each of its blocks."""
-    _, patterns, n = next(iter(vectors.values())).shape
-    total, at_once = np.zeros((operators, n)), max(1, _AT_ONCE // (patterns * n))
-    for up, low in product(vectors, repeat=2):
-        if (up, low) in entries:
-            rows, columns, values = entries[up, low]
-            for start in range(0, len(rows), at_once):
-                here = slice(start, start + at_once)
-                weights = vectors[up][rows[here]].conj()
-                weights *= vectors[low][columns[here]]
-                total += (values[:, here] @ weights.sum(axis=1)).real
-    return total.T
 
 
 def linear_blocks(functions: Basis, terms: Mapping[str, Operator]) -> FunctionBlocks:

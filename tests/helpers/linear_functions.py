@@ -6,7 +6,7 @@ import numpy as np
 from coupled_spaces import Space, contracted_elements
 
 from rotor.quantum.basis.labelled import Elements, merged
-from rotor.quantum.blocks import connected_blocks, elements_by_blocks, expectations, part_numbers
+from rotor.quantum.blocks import connected_blocks, part_numbers
 from rotor.quantum.operators.algebra import shift
 
 NEGLIGIBLE = 1e-12  # of the largest element of an operator between two sectors: round-off of zero
@@ -109,9 +109,10 @@ def states_of(blocks, values):
 def slopes_of(states, elements):
     """⟨ψ|O|ψ⟩ (functions, operators) of the states of linear blocks."""
     slopes = np.zeros((elements.count, len(elements.values)))
-    entries = elements_by_blocks(elements, [rows for rows, _, _ in states])
-    for number, (rows, _, vectors) in enumerate(states):
-        slopes[rows] = expectations(entries, {number: vectors[:, None]}, len(elements.values))
+    for number in range(len(elements.values)):
+        matrix = elements.dense(number)
+        for rows, _, vectors in states:
+            slopes[rows, number] = (vectors.conj() * (matrix[np.ix_(rows, rows)] @ vectors)).sum(axis=0).real
     return slopes
 
 

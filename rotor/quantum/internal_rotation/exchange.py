@@ -30,6 +30,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.labelled import ROUND_OFF, Elements, merged
@@ -113,6 +114,12 @@ class ExchangedTops(TorsionRotation):
             return Elements(plain.count, rows[retained], columns[retained], values[:, retained])
         rows, columns, values = (np.concatenate(part, axis=-1) for part in zip(*pieces, strict=True))
         return merged(plain.count, rows, columns, values)
+
+    def over_products(self, rows: Ints, vectors: NDArray[Any]) -> NDArray[Any]:
+        """States over |J K⟩|K t⟩ (K, t, n), by way of the plain functions that occur in them."""
+        combined = self._combined[0][:, rows]
+        plain = np.unique(combined.nonzero()[0])
+        return super().over_products(plain, combined[plain] @ vectors)
 
     def symmetry_allowed(self, elements: Elements) -> Elements:
         """Elements of the full Hamiltonian without the round-off between functions of different x."""

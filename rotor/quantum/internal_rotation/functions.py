@@ -100,6 +100,19 @@ class TorsionRotation:
         rows, columns = self._rows[0][plain.rows], self._rows[0][plain.columns]
         return self._gathered(len(terms), rows, columns, values)
 
+    def over_products(self, rows: Ints, vectors: NDArray[Any]) -> NDArray[Any]:
+        """States (functions, n) of one J over the functions at some rows as states over |J K⟩|K t⟩ (K, t, n), but for a common phase."""
+        j, k, t, s = (self.plain_labels[name][rows] for name in ("J", "K", "t", "s"))
+        size = 2 * int(j[0]) + 1
+        states = np.zeros((size, self.torsion.count, vectors.shape[1]), dtype=vectors.dtype)
+        states[j + k, t] = vectors
+        if self.folded:
+            pair = k > 0
+            halved = vectors[pair] * np.sqrt(0.5)
+            states[(j + k)[pair], t[pair]] = halved
+            states[(j - k)[pair], t[pair]] = halved * np.where(k % 2, -s, s)[pair, None]
+        return states
+
     def _lower(self, plain: Elements, rank: int) -> Elements:
         """Elements of the rotation with J' ≥ J, and of scalars with K' ≥ K where K and -K are not combined."""
         lower = plain.rows >= plain.columns  # |J K⟩ stand by J, then K

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.blocks import ByBlocks, Entries, elements_by_blocks, expectations
+from rotor.quantum.blocks import ByBlocks, Entries, elements_by_blocks
 from rotor.quantum.internal_rotation.chain_rule import NO_CHAIN, ChainRule, chain_rule, further_operators
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts
+from rotor.quantum.internal_rotation.expectations import Expectations
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
 from rotor.quantum.internal_rotation.rho_axis_tensors import (
@@ -57,7 +59,6 @@ class TorsionMoments(SpeciesMoments):
     chain: ChainRule = NO_CHAIN
     further: Mapping[str, Sequence[Product]] = field(default_factory=dict)
     _cache: dict[Rotor | BodyTensor, ByBlocks] = field(default_factory=dict)
-    _derived: dict[str, ByBlocks] = field(default_factory=dict)
 
     @property
     def combined(self) -> bool:
@@ -87,33 +88,28 @@ class TorsionMoments(SpeciesMoments):
 
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
-        required = {*names, *self.chain.quantities} if set(names) & set(self.chain.constants) else set(names)
-        jacobian = dict(zip(self.model.values, self.model.jacobian.T, strict=True))
-        terms = list(self.levels.source.terms)
-        needed = {terms[i] for name in required & set(jacobian) for i in np.flatnonzero(jacobian[name])}
-        count = mixtures[0][1].shape[-1]
-        slopes = self._slopes_by(needed | (required & set(self.further)), mixtures)
-        by_terms = np.column_stack([slopes.get(term, np.zeros(count)) for term in terms])
-        direct = {name: by_terms @ column for name, column in jacobian.items() if name in required}
-        direct |= {name: slopes[name] for name in self.further if name in required}
-        return self.chain.slopes(names, direct, count)
+        by_operators = self.term_slopes(mixtures)
+        return self.chain.slopes(names, self.by_quantities(by_operators), len(by_operators))
+
+    def by_quantities(self, by_operators: Floats) -> dict[str, Floats]:
+        """∂E/∂q (n,) by the values of the model and the quantities of the chain, from slopes by terms and further operators."""
+        count = len(self.levels.source.terms)
+        slopes = dict(zip(self.model.values, (by_operators[:, :count] @ self.model.jacobian).T, strict=True))
+        return slopes | dict(zip(self.further, by_operators[:, count:].T, strict=True))
 
     def term_slopes(self, mixtures: Mixtures) -> Floats:
         """∂E/∂c (n, terms and further operators) of mixtures of states, by coefficients of the Hamiltonian."""
-        return np.column_stack(list(self._slopes_by([*self.levels.source.terms, *self.further], mixtures).values()))
+        _, patterns, count = mixtures[0][1].shape
+        states: Any = 0.0
+        for block, mixture in mixtures:
+            vectors = block.vectors @ mixture.reshape(len(mixture), -1)
+            states = states + self.levels.functions.over_products(self.levels.members[block.basis.number], vectors)
+        return np.asarray(self._expectations.of_states(states).reshape(patterns, count, -1).sum(axis=0))
 
-    def _slopes_by(self, operators: Iterable[str], mixtures: Mixtures) -> dict[str, Floats]:
-        """⟨ψ|O|ψ⟩ (n,) of mixtures of states for terms and further operators, by name."""
-        vectors = {block.basis.number: np.tensordot(block.vectors, mixture, 1) for block, mixture in mixtures}
-        return {name: expectations(self._elements_by(name), vectors, 1)[:, 0] for name in operators}
-
-    def _elements_by(self, name: str) -> ByBlocks:
-        """Elements of a term or of a further operator by pairs of blocks."""
-        if name not in self._derived:
-            products = self.levels.source.terms.get(name) or self.further[name]
-            elements = self.levels.functions.elements([products])
-            self._derived[name] = elements_by_blocks(elements, self.levels.members)
-        return self._derived[name]
+    @cached_property
+    def _expectations(self) -> Expectations:
+        """Terms and further operators."""
+        return Expectations(self.levels.functions, [*self.levels.source.terms.values(), *self.further.values()])
 
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.labelled import Elements
-from rotor.quantum.blocks import FunctionBlocks, connected_blocks, elements_by_blocks, expectations
+from rotor.quantum.blocks import FunctionBlocks, connected_blocks
 from rotor.quantum.dominated import dominated_states, is_dominated
 from rotor.quantum.internal_rotation.contracted import Product, Terms
+from rotor.quantum.internal_rotation.expectations import Expectations
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
     counted_ka_kc,
@@ -169,16 +171,14 @@ class SpeciesLevels:
         s = self.functions.labels["s"][name]
         return np.asarray(s * self.functions.torsion.parity[v] if self.functions.folded else s)
 
-    def slopes(self, levels: Ints | None = None, elements: Elements | None = None) -> Floats:
-        """⟨ψ|O|ψ⟩ (levels, operators) of some levels, by default of all, and Hermitian operators, by default ∂E/∂c of the terms."""
-        operators = self.source.elements if elements is None else elements
+    def slopes(self, levels: Ints | None = None, further: Sequence[Sequence[Product]] = ()) -> Floats:
+        """⟨ψ|O|ψ⟩ (levels, operators) of some levels, by default of all: ∂E/∂c of the terms, then those of further operators."""
+        operators = Expectations(self.functions, [*self.source.terms.values(), *further])
         levels = np.arange(len(self.energies)) if levels is None else levels
-        used, place = np.unique(np.searchsorted(self.starts, levels, side="right") - 1, return_inverse=True)
-        slopes = np.zeros((len(levels), len(operators.values)))
-        entries = elements_by_blocks(operators, [self.members[number] for number in used])
-        for i, number in enumerate(used.tolist()):
-            if (i, i) in entries:  # blocks of H may be finer than those of O
-                chosen = np.flatnonzero(place == i)
-                vectors = self.vectors[number][:, None, levels[chosen] - self.starts[number]]
-                slopes[chosen] = expectations(entries, {i: vectors}, len(operators.values))
+        block = np.searchsorted(self.starts, levels, side="right") - 1
+        slopes = np.zeros((len(levels), len(operators.operators)))
+        for number in np.unique(block).tolist():
+            here = np.flatnonzero(block == number)
+            vectors = self.vectors[number][:, levels[here] - self.starts[number]]
+            slopes[here] = operators.of_states(self.functions.over_products(self.members[number], vectors))
         return slopes

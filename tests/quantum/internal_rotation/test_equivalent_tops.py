@@ -129,6 +129,25 @@ def test_functions_with_a_sign_give_the_levels_of_plain_ones(case, species):
     assert np.abs(whole[x[every.rows] != x[every.columns]]).max(initial=0.0) < 1e-6  # what `of_whole` leaves out
 
 
+@pytest.mark.parametrize("name", ["AA", "AE", "EE", "EE*"])
+@pytest.mark.parametrize("case", ANGLES)
+def test_expectation_values_are_those_of_the_elements_between_functions(case, name):
+    model = several_tops(ABC, constants_of(case))
+    further = list(model.slopes_by_rho(model.species[name]).values())
+    levels = model.blocks(model.species[name], 3, jmin=2, count=16).solve_once(model.coefficients, 1)
+    slopes = levels.slopes(further=further)
+    elements = levels.functions.elements([*levels.source.terms.values(), *further])
+    for number, column in enumerate(slopes.T):
+        matrix = elements.dense(number)
+        expected = np.concatenate(
+            [
+                (vectors.conj() * (matrix[np.ix_(rows, rows)] @ vectors)).sum(axis=0).real
+                for rows, vectors in zip(levels.members, levels.vectors, strict=True)
+            ]
+        )
+        assert np.allclose(column, expected, rtol=1e-10, atol=1e-10 * np.abs(elements.values[number]).max())
+
+
 @pytest.mark.parametrize("case", ANGLES)
 def test_the_sign_of_a_ground_state_is_that_of_a_rigid_top(case):
     """C2 about the axis changes J(Ka, Kc) by (-1)^Ka, (-1)^(Ka + Kc), (-1)^Kc of a, b, c."""
