@@ -40,7 +40,7 @@ from rotor.spectra.raman import (
 from rotor.table import TextOf
 from rotor.thermodynamics.sums.classical_limit import populated_j
 from rotor.thermodynamics.sums.partition_table import partition_facts
-from rotor.thermodynamics.vibration import VibrationalStates
+from rotor.thermodynamics.vibration import VibrationalStates, missing_fundamentals
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts
 
@@ -105,6 +105,7 @@ class RamanRequest:
     def __post_init__(self) -> None:
         require_top(self.top)
         check_fields(self)
+        missing_fundamentals(self.top, self.vibrations)  # refuses too many
         if self.top.polarizability_abc_angstrom3 is None and self.top.kind != "spherical":
             raise ValueError(
                 f"the polarizability of {self.top.name or 'this top'} is not known; give one, in principal axes"
@@ -123,6 +124,11 @@ class RamanAnswer(TextOf):
     def strongest(self, count: int) -> Ints:
         """Rows of the `count` lines with the largest cross sections, in order of shift."""
         return np.sort(largest(self.lines.cross_section_cm2_per_sr, count))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Limits of the lines, and vibrations left out of Q."""
+        return (*self.lines.warnings, *missing_fundamentals(self.request.top, self.request.vibrations))
 
     @property
     def jmax_source(self) -> str:

@@ -32,7 +32,7 @@ from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
 from rotor.thermodynamics.sums.classical_limit import populated_j
 from rotor.thermodynamics.sums.partition_table import partition_facts
-from rotor.thermodynamics.vibration import VibrationalStates
+from rotor.thermodynamics.vibration import VibrationalStates, missing_fundamentals
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts, without_constants
@@ -156,6 +156,7 @@ class SpectrumRequest:
     def __post_init__(self) -> None:
         require_top(self.top)
         check_fields(self)
+        missing_fundamentals(self.top, self.vibrations)  # refuses too many
         first, last = self.range_mhz
         if not first < last:
             raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")
@@ -199,23 +200,24 @@ class SpectrumAnswer(TextOf):
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Limits of the lines, and a given partition function that is far from the sum over levels."""
+        """Limits of the lines, vibrations left out of Q, and a given Q that is far from the sum over levels."""
         stated, lines = self.request.q, self.lines
+        limits = (*lines.warnings, *missing_fundamentals(self.request.top, self.request.vibrations))
         if stated is None or not lines.levels.has_named_constants:
-            return tuple(lines.warnings)
+            return limits
         try:
             expected = _expected_q(lines)
         except ValueError:  # the sum does not converge
             expected = None
         if expected is None:  # nothing to compare with
-            return tuple(lines.warnings)
+            return limits
         summed, estimated = expected
         if Q_TOO_SMALL * summed <= stated <= Q_TOO_LARGE * summed:
-            return tuple(lines.warnings)
+            return limits
         factor = f"intensities differ by a factor of {summed / stated:.3g}"
         sum_text = f"about {summed:.2g}" if estimated else f"{summed:.4g}"
         text = f"Q = {stated:g} is given where the sum over the levels is {sum_text}: {factor}"
-        return (*lines.warnings, f"{text}; vibration makes Q larger, other spin weights change it by a whole number")
+        return (*limits, f"{text}; vibration makes Q larger, other spin weights change it by a whole number")
 
     @property
     def column_per_cm2(self) -> float | None:

@@ -33,7 +33,7 @@ from rotor.thermodynamics.functions import (
 from rotor.thermodynamics.sums.classical_limit import classical_limit, populated_j, rotational_temperatures_k
 from rotor.thermodynamics.sums.classical_onset import classical_above_if_known
 from rotor.thermodynamics.sums.level_sums import OutOfReachError, Progress
-from rotor.thermodynamics.vibration import VibrationalStates
+from rotor.thermodynamics.vibration import VibrationalStates, missing_fundamentals
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts
 
@@ -109,6 +109,7 @@ class ThermoRequest:
     def __post_init__(self) -> None:
         require_top(self.top)
         check_fields(self)
+        missing_fundamentals(self.top, self.vibrations)  # refuses too many
         names = species_names(self.top)
         if self.species not in names:
             only = "; its levels are all of one nuclear-spin species" if len(names) == 1 else ""
@@ -186,8 +187,9 @@ class ThermoAnswer(TextOf):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Temperatures without a sum, and electronic functions of a linear radical that its spin degeneracy does not count."""
-        return (*self._refusal_notes, *self._electronic_notes)
+        """Temperatures without a sum, vibrations left out, and a linear radical whose spin degeneracy is not all of it."""
+        missing = missing_fundamentals(self.request.top, self.request.vibrations)
+        return (*self._refusal_notes, *missing, *self._electronic_notes)
 
     @property
     def _refusal_notes(self) -> tuple[str, ...]:

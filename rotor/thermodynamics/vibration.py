@@ -9,13 +9,17 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.statistics.degrees_of_freedom import vibrational_degrees
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
 
 LEAST_CM = 1e-3  # lowest vibrational energy; avoids overflow of kT/E
 
@@ -84,6 +88,27 @@ class VibrationalStates:
         return vibrational_partition_function(
             self.energies_cm, self.degeneracies, temperature_k, harmonic=self.harmonic
         )
+
+
+def missing_fundamentals(top: Top, vibrations: VibrationalStates | None) -> tuple[str, ...]:
+    """A note if fewer fundamentals are given than a molecule of known nuclei has vibrations.
+
+    Raises ValueError for more of them than that.
+    """
+    if vibrations is None or not vibrations.harmonic or top.molecule is None:
+        return ()
+    linear = top.kind == "linear"
+    count = vibrational_degrees(len(top.molecule.nuclei), linear)
+    given = sum(vibrations.degeneracies)
+    has = f"{given} given, but {top.molecule.formula} has 3N - {5 if linear else 6} = {count} vibrations"
+    if given > count:
+        raise ValueError(f"fundamentals: {has}; overtones are counted already, other states go into a list of states")
+    turning = 0 if top.internal_rotation is None else top.internal_rotation.tops  # torsions are among the levels
+    if given >= count - turning:
+        return ()
+    return (
+        f"fundamentals: {has}: Q is without the others; a degenerate vibration counts with its degeneracy, as 667.4x2",
+    )
 
 
 _ENERGY = re.compile(

@@ -118,6 +118,19 @@ def test_vibration_without_gas(call):
     assert row["q_vib"] == pytest.approx(VibrationalStates((667.4,), (2,)).factor(300.0), rel=1e-12)
 
 
+@pytest.mark.parametrize("verb", ["thermo", "spectrum", "raman"])
+def test_fundamentals_are_counted_against_the_degrees_of_freedom(call, verb):
+    """3N - 5 = 4 of OCS: bending once instead of twice is noted, five are refused, and four pass in silence."""
+    for given, code, words in (
+        ("520,859,2062", 0, "3 given, but COS has 3N - 5 = 4"),
+        ("520x3,859,2062", 2, "5 given"),
+    ):
+        returned, _, err = call(verb, "OCS", "--temperature", "300", "--vibration", given)
+        assert (returned, words in err) == (code, True)
+    _, _, err = call(verb, "OCS", "--temperature", "300", "--vibration", "520x2,859,2062")
+    assert "fundamentals" not in err
+
+
 def test_parquet_and_csv_have_the_same_numbers(call, folder):
     import polars as pl
 
