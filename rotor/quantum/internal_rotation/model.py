@@ -119,7 +119,7 @@ class RamModel:
         """
         abc = np.array([self.values[name] for name in "ABC"])
         along = float(self.frame.matrix[0] ** 2 @ abc)
-        return self.frame.normal == "a" or 3 * along <= abc.sum()
+        return not self.frame.rows[0][0] or 3 * along <= abc.sum()
 
     def blocks(
         self,

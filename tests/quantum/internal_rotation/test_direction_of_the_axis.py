@@ -13,6 +13,7 @@ from rotor.quantum.internal_rotation.model import model_of_principal_axes
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 ROTATION = {"A": 9e3, "B": 5e3, "C": 4e3}
+OBLATE = {"A": 10e3, "B": 9e3, "C": 5e3}
 QUARTIC = {"DeltaJ": 0.01, "DeltaJK": 0.02, "DeltaK": 0.05, "deltaJ": 0.003, "deltaK": 0.006}
 TOP = {"F0": 157e3, "V3": 1e7, "V6": 3e5}
 DIRECTIONS = {
@@ -59,11 +60,13 @@ def test_levels_are_those_of_the_direct_product(plane, sigma):
         assert np.abs(energies - expected).max() < 1e-6  # MHz; elements are up to 1e8: rounding is 1e-7
 
 
-@pytest.mark.parametrize("plane", DIRECTIONS)
-def test_names_behind_a_high_barrier_are_those_of_a_rigid_top(plane):
-    """V3 = 1e8 MHz: the spacings differ by the reaction of the torsion, 2.4 MHz of 4e5; swapped names by far more."""
+@pytest.mark.parametrize(
+    ("rotation", "plane"), [(rotation, plane) for rotation in (ROTATION, OBLATE) for plane in DIRECTIONS]
+)
+def test_names_behind_a_high_barrier_are_those_of_a_rigid_top(rotation, plane):
+    """V3 = 1e8 MHz: the spacings differ by the reaction of the torsion, up to 7.7 MHz of 3e5; swapped names by far more."""
     internal = InternalRotationConstants({"F0": 157e3, "V3": 1e8, **DIRECTIONS[plane]}, "PAM", vt_max=0, functions=15)
-    constants = rotor.Constants(**ROTATION, reduction="A", representation="Ir")
+    constants = rotor.Constants(**rotation, reduction="A", representation="Ir")
     rigid = rotor.api.solve_levels(rotor.Top.from_constants(constants), 6)
     levels = rotor.api.solve_levels(rotor.Top.from_constants(constants, internal_rotation=internal), 6)
     for species in "AE":
@@ -74,7 +77,7 @@ def test_names_behind_a_high_barrier_are_those_of_a_rigid_top(plane):
                 for j in range(7) for ka in range(j + 1) for kc in (j - ka, j - ka + 1) if 0 <= kc <= j
             ]  # fmt: skip
             energies.append(table.energy_mhz[rows] - table.energy_mhz[rows[0]])
-        assert np.abs(energies[0] - energies[1]).max() < 3.0
+        assert np.abs(energies[0] - energies[1]).max() < 8.0
 
 
 @pytest.mark.parametrize(("smiles", "plane"), [("CN", "ac"), ("CC=O", "ab"), ("CCO", "none")])
