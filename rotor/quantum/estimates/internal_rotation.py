@@ -6,13 +6,9 @@ the principal frame and the moments I_g of the whole molecule, the kinetic energ
     H = A P_a² + B P_b² + C P_c² + F (p - ρ·P)² + V3/2 (1 - cos 3α),
     r = 1 - Σ_g λ_g² I_α/I_g,    F = ħ²/(2 r I_α),    ρ_g = λ_g I_α/I_g
 
-(C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841, as cited by the reviews that were read; derived here). In axes with z along ρ
-the torsional part depends only on K of P_z,
-
-    h(K, σ) = F (p - |ρ| K)² + V3/2 (1 - cos 3α)    on    exp i(3k + σ)α,    σ = 0 of A, 1 of E,
-
-The lowest state |K, σ⟩ is computed for each K, and ⟨K'|H_rot|K⟩ is multiplied by the overlap ⟨K', σ|K, σ⟩. Neglected are excited torsional
-states, which change A - E splittings of methyl formate by less than 1e-4 of their size, the dependence of A, B, C on α, and other groups.
+(C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841, as cited by the reviews that were read; derived here). The levels are those of
+`rotor.quantum.internal_rotation.model` with the lowest torsional state of each K alone. Neglected are excited torsional states, which
+change A - E splittings of methyl formate by less than 1e-4 of their size, the dependence of A, B, C on α, and other groups.
 docs/validation/estimates.md compares with measured lines.
 """
 
@@ -23,7 +19,6 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Floats
 from rotor.frozen import dataclass
-from rotor.quantum.torsion import TorsionalPotential, torsional_states
 
 A_SPECIES, E_SPECIES = 0, 1  # σ
 _WAVES = 16  # |k| of exp i(3k + σ)α: enough for |ρ| K up to 21 and V3 of a thousand F
@@ -54,48 +49,24 @@ def rotor_of_moments(top_moment: float, cosines: Floats, moments: Floats, barrie
     return InternalRotor(free, barrier_mhz, (float(rho[0]), float(rho[1]), float(rho[2])))
 
 
-def lowest_torsion(rotor: InternalRotor, k: Floats, species: int) -> tuple[Floats, Floats]:
-    """Energies (n,) in MHz and vectors (n, waves) of the lowest torsional state at each K (n,).
-
-    >>> free = InternalRotor(150_000.0, 0.0, (0.0, 0.0, 0.0))
-    >>> lowest_torsion(free, np.zeros(1), E_SPECIES)[0].tolist()  # F m² of m = 1
-    [150000.0]
-    """
-    potential, shifts = TorsionalPotential({3: rotor.barrier_mhz}), float(np.linalg.norm(rotor.rho)) * k
-    solved = torsional_states(rotor.f_mhz, potential, shifts=shifts, species=species, fold=3, waves=_WAVES, count=1)
-    return solved.energies[:, 0], _same_signs(solved.vectors[:, :, 0])
-
-
-def _same_signs(vectors: Floats) -> Floats:
-    """Vectors with signs that make the overlaps of neighbouring rows positive."""
-    turned = np.where(np.sum(vectors[1:] * vectors[:-1], axis=1) < 0, -1.0, 1.0)
-    return np.asarray(vectors * np.cumprod(np.concatenate([[1.0], turned]))[:, None])
-
-
 def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRotor, j: int, species: int) -> Floats:
     """Energies (2J+1,) in MHz of one species of the torsional ground state, above the minimum of the potential.
 
-    They are ordered by ⟨P_z²⟩ and thus by Ka: first K = 0, then pairs with the lower level first.
+    They are ordered by Ka, of each pair the lower level first.
 
-    >>> levels = species_levels((9.0, 4.0, 3.0), InternalRotor(150_000.0, 1e7, (0.0, 0.0, 0.0)), 1, A_SPECIES)
+    >>> levels = species_levels((9.0, 4.0, 3.0), InternalRotor(150_000.0, 1e7, (1e-9, 0.0, 0.0)), 1, A_SPECIES)
     >>> (levels - levels[0]).round(6).tolist()  # above 1(0,1): B - C of 1(1,1) with A - B
     [0.0, 5.0, 6.0]
     """
     # the package of internal rotation is loaded for tops that have one alone
-    from rotor.quantum.internal_rotation.frames import frame_along
+    from rotor.quantum.internal_rotation.model import RamModel
+    from rotor.quantum.internal_rotation.terms import Axes
 
-    axes = frame_along(rotor.rho) if any(rotor.rho) else np.eye(3)
-    frame = axes[[1, 2, 0]]  # x, y, z with z along ρ
-    tensor = frame @ np.diag(constants_mhz) @ frame.T
-    k = np.arange(-j, j + 1.0)
-    step = 0.5 * np.sqrt(j * (j + 1) - k[:-1] * (k[:-1] + 1))
-    p_z, p_x = np.diag(k), np.diag(step, 1) + np.diag(step, -1)
-    p = (p_x, 1j * (p_z @ p_x - p_x @ p_z), p_z)
-    rotation = sum(tensor[a, b] * (p[a] @ p[b] + p[b] @ p[a]) / 2 for a in range(3) for b in range(3))
-    energies, vectors = lowest_torsion(rotor, k, species)
-    eigenvalues, states = np.linalg.eigh(rotation * (vectors @ vectors.T) + np.diag(energies))
-    by_k = eigenvalues[np.argsort(k**2 @ np.abs(states) ** 2, kind="stable")]
-    return np.concatenate([by_k[:1], np.sort(by_k[1:].reshape(j, 2), axis=1).ravel()])
+    rotation = dict(zip("ABC", constants_mhz, strict=True))
+    torsion = {"F": rotor.f_mhz, "rho": float(np.linalg.norm(rotor.rho)), "V3": rotor.barrier_mhz}
+    model = RamModel(rotation | torsion, frame=Axes.along(rotor.rho))
+    levels = model.blocks(species, j, jmin=j, count=1, waves=_WAVES).solve_once(model.coefficients, 0)
+    return levels.energies[np.lexsort([-levels.quanta["kc"], levels.quanta["ka"]])]
 
 
 @dataclass(frozen=True)

@@ -278,14 +278,13 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
 def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:
     """Size of the A - E splitting of lines J+1 ← J, and text on the barrier.
 
-    The size is that of the lines which the larger part of the dipole allows: ΔK = 0 along ρ, ΔK = 1 across it.
+    The size is that of the lines which the larger part of the dipole allows: ΔKa = 0 along a, ΔKa = 1 across it.
     """
     barrier, rotor = group.barrier, group.rotor
     lines = {"within one K": shifts.same, "between two K": shifts.other}
     sizes = [(where, float(np.median(np.abs(splittings)))) for where, splittings in lines.items()]
     dipole = np.array(top.dipole_abc_debye or (0.0, 0.0, 0.0))
-    along = dipole[np.argmax(np.abs(rotor.rho))]
-    if dipole @ dipole > 2 * along**2:
+    if dipole @ dipole > 2 * dipole[0] ** 2:
         sizes.reverse()
     assert barrier is not None  # without a barrier the caller states a bound
     assert top.molecule is not None
