@@ -50,7 +50,11 @@ class ViewRequest:
         None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, cm-1, km/s", panel=PANEL
     )
     rest_mhz: float | None = declared(
-        None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest", panel=PANEL
+        None,
+        Quantity("MHz", above=0, metavar="F"),
+        "Rest frequency of a velocity axis (MHz)",
+        option="--rest",
+        panel=PANEL,
     )
     unit: str | None = declared(
         None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, V, absorbance, Jy/beam", panel=PANEL

@@ -21,6 +21,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,10 +240,10 @@ def bond_text(bond: str | Sequence[int]) -> str:
     """
     if isinstance(bond, str):
         return bond
-    whole = isinstance(bond, Sequence) and all(isinstance(n, int) and not isinstance(n, bool) for n in bond)
-    if not whole or len(bond) != 2:
+    numbers = tuple(bond) if isinstance(bond, Sequence | np.ndarray) else ()
+    if len(numbers) != 2 or not all(isinstance(n, Integral) and not isinstance(n, bool) for n in numbers):
         raise ValueError(f"{bond!r}: expected two atom numbers, such as 1-2")
-    return f"{bond[0]}-{bond[1]}"
+    return f"{numbers[0]}-{numbers[1]}"
 
 
 def turning_bonds(molecule: Molecule) -> Iterator[tuple[int, int]]:

@@ -49,7 +49,7 @@ class SpectrumFile:
     """Facts that the file of a spectrum does not state, and corrections before its use."""
 
     rest_mhz: float | None = observed(
-        None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest"
+        None, Quantity("MHz", above=0, metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest"
     )
     unit: str | None = observed(
         None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, Jy/beam, mJy/beam, absorbance"

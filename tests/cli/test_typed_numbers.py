@@ -105,6 +105,8 @@ REFUSED = [
     (("accuracy", "s.toml", "--seconds", "20 V"), "--seconds: '20 V': unit 'V' is not a known unit"),
     (("tumble", "water", "--angular-momentum", "0,1,9 V"), "--angular-momentum: '0,1,9 V': unit 'V' is not a known unit"),
     (("identify", "a.csv", "--catalogue", "a.cat", "--velocity", "8 MHz"), "--velocity: '8 MHz': unit 'MHz' does not"),
+    (("identify", "a.csv", "--catalogue", "a.cat", "--rest", "0"), "--rest: 0: expected a finite number above 0 MHz"),
+    (("view", "a.csv", "--rest", "-5GHz"), "--rest: -5GHz: expected a finite number above 0 MHz"),
     (("identify", "a.csv", "--catalogue", "a.cat", "--background", "-5"), "--background: -5: expected a finite number of 0 K or more"),
     (("identify", "a.csv", "--catalogue", "a.cat", "--model-error", "8 K"), "--model-error: '8 K': expected plain numbers"),
     (("levels", "water", "--jmax", "2 K"), "--jmax: '2 K': expected a whole number"),

@@ -381,13 +381,13 @@ def test_a_bond_needs_a_geometry():
         TorsionRequest(Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]])))
 
 
-@pytest.mark.parametrize("bond", [(1, 2), [1, 2], "1-2"])
+@pytest.mark.parametrize("bond", [(1, 2), [1, 2], "1-2", (np.int64(1), 2), np.array([1, 2])])
 def test_a_bond_is_a_text_or_two_numbers(bond):
     answer = rotor.torsion(rotor.read("C2H6"), bond=bond, potential="V3=1013 cm-1", vmax=0)
     assert answer.facts()["bond"] == "1-2"
 
 
-@pytest.mark.parametrize("bond", [(1,), (1, 2, 3), (1.0, 2), (True, 2), 12])
+@pytest.mark.parametrize("bond", [(1,), (1, 2, 3), (1.0, 2), (True, 2), 12, np.array([1.0, 2.0])])
 def test_what_is_no_pair_of_atoms_is_refused(bond):
     with pytest.raises(ValueError, match=r"bond: .*expected two atom numbers, such as 1-2"):
         rotor.torsion(rotor.read("C2H6"), bond=bond, potential="V3=1013 cm-1")
