@@ -37,8 +37,8 @@ def conformer_constants(text: str) -> tuple[float, ...]:
             continue
         if conformer.molecule.uncertainty is None or conformer.molecule.uncertainty > WORST:
             raise ValueError(
-                f"{PREFIX}{text}: the force field knows the geometry of this molecule to no better than "
-                f"{conformer.molecule.uncertainty or 1:.0%}, and a guess is to be right within 3 %; give A, B, C as numbers"
+                f"{PREFIX}{text}: rotational constants from the force field are good to "
+                f"{conformer.molecule.uncertainty or 1:.0%} only, and a guess needs 3 %; give A, B, C as numbers"
             )
         top = Top.from_molecule(conformer.molecule)
         if top.kind != "asymmetric":

@@ -139,7 +139,7 @@ class SpinsInput:
     """Whether spins of nuclei take part."""
 
     hyperfine: bool | None = declared(
-        None, Flag(off=True), "With the spins of nuclei; by default where their constants are given", "effects.hyperfine",
+        None, Flag(off=True), "Include the spins of nuclei; by default where their constants are given", "effects.hyperfine",
         common=True, example=True,
     )  # fmt: skip
 

@@ -371,7 +371,7 @@ def test_conformers_of_a_smiles_as_guesses() -> None:
     ("guess", "message"),
     [
         ("SMILES:C1CC", "cannot be read"),
-        ("SMILES:C=C=C=O", "no better than 20%"),
+        ("SMILES:C=C=C=O", "force field are good to 20% only"),
         ("SMILES:CC#N", "only asymmetric tops"),
         ("2458,490", "expected three numbers"),
         ("abc", "abc"),

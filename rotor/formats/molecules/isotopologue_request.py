@@ -35,7 +35,7 @@ class IsotopologuesRequest:
         "observables.min_abundance", common=True, example=0.01,
     )  # fmt: skip
     each: tuple[str, ...] = declared(
-        (), Names("O=18O"), "Each atom of an element substituted, one at a time; repeatable", "observables.each", common=True,
+        (), Names("O=18O"), "Substitute each atom of an element in turn, such as O=18O; repeatable", "observables.each", common=True,
         example=["O=18O"],
     )  # fmt: skip
     site: tuple[str, ...] = declared(

@@ -53,7 +53,7 @@ def read_text_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
         notes = (*notes, f"{low}; if the numbers are GHz, --axis-unit GHz says so")
     if axis_unit is None and (numbers[:, 0] <= 0).any():
         raise ValueError(
-            f"{name}: {numbers[:, 0].min():g} in the first column, that of the frequencies, which are read in MHz; for velocities give "
+            f"{name}: the first column, read as frequencies in MHz, contains {numbers[:, 0].min():g}; for velocities give "
             "--axis-unit km/s and --rest"
         )
     third = numbers.shape[1] > 2 and len(names) > 2 and _NOISE.search(names[2])

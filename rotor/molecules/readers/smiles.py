@@ -296,7 +296,7 @@ def _optimised(mol: Any, text: str, count: int) -> tuple[list[float], str]:
         elif rdForceFieldHelpers.UFFHasAllMoleculeParams(mol):
             field, optimise = "UFF", rdForceFieldHelpers.UFFOptimizeMoleculeConfs
         else:
-            raise ValueError(f"SMILES {text!r}: neither MMFF94 nor UFF knows its atoms; give an xyz file")
+            raise ValueError(f"SMILES {text!r}: neither MMFF94 nor UFF has parameters for its atoms; give an xyz file")
         try:
             results = optimise(mol, maxIters=_MOST_STEPS)
         except RuntimeError:  # RDKit's own checks, such as of forces that are not finite

@@ -73,7 +73,7 @@ class TorsionRequest:
 
     top: Top
     bond: str | Sequence[int] = declared(
-        "", Custom(bond_text, metavar="I-J"), "Bond between atoms I-J, counted from 1; the group behind J turns", "observables.bond",
+        "", Custom(bond_text, metavar="I-J"), "Bond between atoms I-J, counted from 1; the group at J turns", "observables.bond",
         common=True, example="1-2",
     )  # fmt: skip
     potential: Any = declared(
