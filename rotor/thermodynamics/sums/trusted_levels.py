@@ -10,17 +10,17 @@ are solved only if the estimate A Ka² + C Kc² + B (J(J+1) - Ka² - Kc²) does 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators, operators_by_name
+from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators
+from rotor.quantum.estimates.accuracy import energies_like, to_order
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
-from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
 
 if TYPE_CHECKING:
@@ -137,24 +137,10 @@ def _simpler_mhz(top: Top, levels: Levels, rigid: Floats) -> tuple[Floats, Float
     """Energies (n,) in MHz of the rigid top and with quartic distortion, in the order of the levels."""
     if top.kind != "asymmetric":
         return rigid, rigid + _first_order_quartic_mhz(top, levels)[0]
-    plain, quartic = (_energies_like(top.with_constants(_truncated(top, order)), levels) for order in (1, 2))
+    jmin, jmax = int(levels.rotational.min()), int(levels.rotational.max())
+    simpler = (solve_levels(to_order(top, order), jmax, jmin=jmin, vectors=False) for order in (2, 4))
+    plain, quartic = (energies_like(levels, solved) for solved in simpler)
     return plain, quartic
-
-
-def _truncated(top: Top, order: int) -> Constants:
-    """The constants of terms up to J^(2·order)."""
-    constants = top.constants
-    operators = operators_by_name(constants)
-    values: dict[str, Any] = {k: v for k, v in constants.values.items() if all(sum(p) <= order for p in operators[k])}
-    reduction = constants.reduction if order > 1 else None
-    return Constants(kind=constants.kind, reduction=reduction, representation=constants.representation, **values)
-
-
-def _energies_like(top: Top, levels: Levels) -> Floats:
-    """Energies of a top in the order of the levels of another, by their labels."""
-    j = levels.rotational
-    solved = solve_levels(top, int(j.max()), jmin=int(j.min()), vectors=False)
-    return np.asarray(solved.energy_mhz[solved.rows_of(**{name: levels.quanta[name] for name in ("j", "ka", "kc")})])
 
 
 def _first_order_quartic_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
