@@ -8,6 +8,7 @@ from functools import reduce
 import numpy as np
 import pytest
 from coupled_spaces import Space, coupled, spin_space
+from field_matrices import contracted_vectors, states
 from linear_functions import (
     NEGLIGIBLE,
     RealFunctions,
@@ -91,6 +92,37 @@ def test_components_along_the_molecule_obey_the_anomalous_commutators(real):
     x, y, z = (matrix(operator) for operator in (j_x(), j_y(), j_z()))
     assert np.allclose(x @ y - y @ x, -1j * z, atol=1e-12)  # exact but for rounding of square roots of 20
     assert np.allclose(matrix(j_x() @ j_x() + j_y() @ j_y() + j_z() @ j_z()), matrix(j_squared()), atol=1e-12)
+
+
+def test_which_angular_momenta_commute_with_the_hamiltonian():
+    """J_Z = Σ_g Φ_Zg J_g is M. A free top has J², J_Z, and J_z if symmetric; a field along Z leaves J_Z alone, an oblique one none.
+
+    Direction cosines Φ are QuTiP's. Products through J + 1 count to J = 3 only.
+    """
+    labelled = states(4)
+    basis = Basis(dict(zip(("J", "K", "M"), np.array(labelled).T, strict=True)))
+    along = [basis.elements([operator]).dense() for operator in (j_x(), j_y(), j_z())]
+    squared = basis.elements([j_squared()]).dense()
+    j_space = sum(contracted_vectors(labelled, unit, [0, 0, 1]) @ j for unit, j in zip(np.eye(3), along, strict=True))
+    assert np.allclose(j_space, np.diag(basis.labels["M"]), atol=1e-12)
+    asymmetric, prolate = (
+        sum(b * j @ j for b, j in zip(rates, along, strict=True)) for rates in ([6, 4, 10], [4, 4, 10])
+    )
+    inner = np.ix_(basis.labels["J"] < 4, basis.labels["J"] < 4)
+
+    def commute(hamiltonian):
+        """Whether J², J_Z, J_z commute with it."""
+        pairs = (hamiltonian @ j - j @ hamiltonian for j in (squared, j_space, along[2]))
+        sizes = [np.abs(pair[inner]).max() for pair in pairs]
+        assert all(size < 1e-11 or size > 0.1 for size in sizes)  # round-off of H and J² of 200
+        return [bool(size < 1e-11) for size in sizes]
+
+    assert commute(asymmetric) == [True, True, False]
+    assert commute(prolate) == [True, True, True]
+    fields = [contracted_vectors(labelled, [0.7, 0, 1.0], field) for field in ([0, 0, 1], [0.6, 0, 0.8])]
+    assert commute(asymmetric - fields[0]) == [False, True, False]
+    assert commute(asymmetric - fields[1]) == [False, False, False]
+    assert commute(prolate - contracted_vectors(labelled, [0, 0, 1], [0, 0, 1])) == [False, True, True]
 
 
 def test_products_and_anticommutators_of_operators_are_those_of_their_matrices():
