@@ -1,5 +1,5 @@
 # %% [markdown]
-# # A ball let go, and one launched, in a spinning space station
+# # A ball let go, and one launched, in a spinning space station; and a centrifuge
 # Seen from space a free ball flies straight. The station is a rigid body that turns freely, and its attitude at any time is
 # exact; the path seen from inside is the straight one in the station's axes, bent by what people on board call centrifugal
 # and Coriolis forces. A ball let go at radius r inside a floor of radius R flies √(R² - r²) at the speed Ω r, and lands
@@ -58,3 +58,32 @@ _, place = landing(np.zeros(3), np.array([20.0, 0.0, 0.0]))
 assert np.isclose(-np.arctan2(place[1], place[0]) % (2 * np.pi), spin[2] * radius / 20.0, atol=1e-12)
 hover = seen_inside(np.array([90.0, 0.0, 0.0]), np.array([0.0, -90.0 * spin[2], 0.0]), np.linspace(0.0, 10.0, 11))
 assert np.allclose(np.linalg.norm(hover, axis=1), 90.0, rtol=1e-14)
+
+# %% [markdown]
+# ## A centrifuge
+#
+# At 15,000 turns a minute, 8 cm from the axis, a sample weighs 20,128 times what it does at rest; the rule of laboratories,
+# 1.118e-5 r/cm (turns a minute)², says 20,124. A bead that slides without friction from r₀ along a radial tube is at r₀ cosh Ωt, and reaches
+# the bottom R after acosh(R/r₀)/Ω. Seen from space nothing pulls it outwards: the wall of the tube pushes it sideways, with 2Ωv.
+
+# %%
+rate, bottom, inner = 15_000 * 2 * np.pi / 60, 0.08, 0.04
+drum = free_motion(moments, moments * [0.0, 0.0, rate])
+arrival = np.arccosh(bottom / inner) / rate
+h = 1e-3 / rate
+times = 0.5 * arrival + np.array([-h, 0.0, h])
+
+
+def acceleration_along_the_tube(radii):
+    """Acceleration in space, by differences, of what is at these radii of the tube at the three times; in axes of the tube."""
+    path = rotate(drum.at(times)[1], radii[:, None] * np.array([1.0, 0.0, 0.0]))
+    return rotate(conjugate(drum.at(times[1])[1]), (path[0] - 2 * path[1] + path[2]) / h**2)
+
+
+weight = -acceleration_along_the_tube(np.full(3, bottom))[0] / g
+print(f"{weight:.0f} g at the bottom; a bead from half way arrives after {1e3 * arrival:.4f} ms")
+assert np.isclose(weight, 1.118e-5 * 8 * 15_000**2, rtol=1e-3)  # the rule has four digits
+bead, speed = inner * np.cosh(rate * times), inner * rate * np.sinh(rate * times[1])
+assert np.allclose(acceleration_along_the_tube(bead), [0, 2 * rate * speed, 0], atol=1e-6 * rate**2 * bottom)  # h²
+assert np.isclose(inner * np.cosh(rate * arrival), bottom, rtol=1e-14)
+assert abs(1e3 * arrival - 0.8384) < 5e-5  # acosh 2/(500π s⁻¹)
