@@ -63,8 +63,9 @@ assert np.allclose(np.linalg.norm(hover, axis=1), 90.0, rtol=1e-14)
 # ## A centrifuge
 #
 # At 15,000 turns a minute, 8 cm from the axis, a sample weighs 20,128 times what it does at rest; the rule of laboratories,
-# 1.118e-5 r/cm (turns a minute)², says 20,124. A bead that slides without friction from r₀ along a radial tube is at r₀ cosh Ωt, and reaches
-# the bottom R after acosh(R/r₀)/Ω. Seen from space nothing pulls it outwards: the wall of the tube pushes it sideways, with 2Ωv.
+# 1.118e-5 r/cm (turns a minute)², says 20,124. A bead that slides without friction from r₀ along a radial tube is at
+# r₀ cosh Ωt, and reaches the bottom R after acosh(R/r₀)/Ω. Seen from space nothing pulls it outwards: the wall of the tube
+# pushes it sideways, with 2Ωv.
 
 # %%
 rate, bottom, inner = 15_000 * 2 * np.pi / 60, 0.08, 0.04
