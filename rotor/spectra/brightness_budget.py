@@ -28,7 +28,6 @@ from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.spectra.emission import KM_PER_S, contrast_k
 from rotor.spectra.emitters import CatalogueLines
-from rotor.thermodynamics.sums.classical_limit import populated_j
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -79,10 +78,10 @@ def brightness_budget(answer: Any) -> ErrorBudget:
 def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm:
     """Error of T_B at the centre of the brightest line from shifted frequencies and neglected splittings."""
     request, peak, lines = answer.request, answer.peak, answer.emitted[number]
-    top, source = request.molecules[number], request.sources[number]
+    top = request.molecules[number]
     if isinstance(top, CatalogueLines):
         return ErrorTerm(None, "a catalogue does not state what its lines neglect")
-    limits = [*all_limits(top, populated_j(top, source.excitation_k), lines.effects), *_estimated(top, peak)]
+    limits = [*all_limits(top, lines.typical_j, lines.effects), *_estimated(top, peak)]
     splittings = [limit for limit in limits if limit.name in SPLITTING and limit.size_mhz is not None]
     shifts = model_term([limit for limit in limits if limit not in splittings])
     if peak is None or not splittings:

@@ -24,6 +24,7 @@ from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.spectra.emission import KM_PER_S, Source, peak_depth
 from rotor.spectra.lines import line_list
 from rotor.spectra.profiles import gaussian
+from rotor.thermodynamics.sums.classical_limit import typical_j
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -97,7 +98,8 @@ class EmittedLines:
 
     energy_upper_k: E′/k. q: partition function, with its source. quanta: names of the quantum numbers in upper and lower; empty for a
     catalogue, whose numbers are as printed. effects, hyperfine: of the Hamiltonian of a top; hyperfine is None without spins.
-    q_error: relative bound of the sum Q; 0 for a catalogue. left_out_depth: bound of the optical depth of neglected lines, anywhere.
+    typical_j: J at which effects on a top's lines are compared. q_error: relative bound of the sum Q; 0 for a catalogue.
+    left_out_depth: bound of the optical depth of neglected lines, anywhere.
     """
 
     temperature_k: float
@@ -112,6 +114,7 @@ class EmittedLines:
     q_source: str
     quanta: tuple[str, ...] = ()
     effects: tuple[QuantumEffect, ...] = ()
+    typical_j: int = 0
     hyperfine: dict[str, Any] | None = None
     notes: tuple[str, ...] = ()
     q_error: float = 0.0
@@ -200,6 +203,7 @@ def _top_lines(
         q_source=lines.partition.source,
         quanta=tuple(lines.quanta_names),
         effects=tuple(lines.levels.effects),
+        typical_j=typical_j(top, source.excitation_k, lines.levels.rotational[lines.upper[rows]], lines.jmax),
         hyperfine=hyperfine_facts(top, lines.levels),
         notes=(*_geometry_notes(top), *lines.warnings),
         q_error=lines.partition.relative_error,

@@ -178,11 +178,9 @@ def describe_spectrum(request: Any, _: Cost) -> dict[str, Any]:
 
 def describe_raman(request: Any, cost: Cost) -> dict[str, Any]:
     """What Raman lines are, with J max of the answer."""
-    from rotor.thermodynamics.sums.classical_limit import populated_j
-
     top, answer, jmax = request.top, cost.answer, cost.answer.lines.jmax
     parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
-    described = plan_fields(top, populated_j(top, request.temperature_k), request.effects)
+    described = plan_fields(top, answer.typical_j, request.effects)
     return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
 
 
@@ -210,15 +208,14 @@ RAMAN = _line_numerics(
 
 def describe_emission(request: Any, cost: Cost) -> dict[str, Any]:
     """What a source does."""
-    from rotor.thermodynamics.sums.classical_limit import populated_j
     from rotor.tops.top import Top
 
     answer, effects = cost.answer, list[str]()
     neglected = [LeftOut("departures from one excitation temperature", None, "", "collisions and radiation")]
-    for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
+    for name, top, lines in zip(request.names, request.molecules, answer.emitted, strict=True):
         if not isinstance(top, Top):
             continue
-        j, hamiltonian = populated_j(top, source.excitation_k), lines.effects
+        j, hamiltonian = lines.typical_j, lines.effects
         effects += [f"{name}: {text}" for text in effect_texts(top, j, hamiltonian)]
         largest_effect = [part for part in neglected_in_levels(top, j, hamiltonian) if part.size is not None][:1]
         neglected += [replace(part, name=f"{name}: {part.name}") for part in largest_effect]

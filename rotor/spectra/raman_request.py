@@ -38,7 +38,7 @@ from rotor.spectra.raman import (
     raman_lines,
 )
 from rotor.table import TextOf
-from rotor.thermodynamics.sums.classical_limit import populated_j
+from rotor.thermodynamics.sums.classical_limit import typical_j
 from rotor.thermodynamics.sums.partition_table import partition_facts
 from rotor.thermodynamics.vibration import VibrationalStates, missing_fundamentals
 from rotor.thermodynamics.vibration_input import vibrations_field
@@ -131,6 +131,14 @@ class RamanAnswer(TextOf):
         return (*self.lines.warnings, *missing_fundamentals(self.request.top, self.request.vibrations))
 
     @property
+    def typical_j(self) -> int:
+        """The J at which effects are compared."""
+        lines, rotational = self.lines, self.lines.levels.rotational
+        return typical_j(
+            lines.top, lines.temperature_k, np.maximum(rotational[lines.initial], rotational[lines.final]), lines.jmax
+        )
+
+    @property
     def jmax_source(self) -> str:
         """Reason for the highest J."""
         if self.request.jmax is not None:
@@ -158,7 +166,7 @@ class RamanAnswer(TextOf):
         errors = None
         if covariance is not None:
             errors = line_errors(level_spread(top, lines.levels, covariance), lines.initial, lines.final)
-        limits = all_limits(top, populated_j(top, lines.temperature_k), effects)
+        limits = all_limits(top, self.typical_j, effects)
         source = source_of_errors(top, parameters, None)
         return frequencies_budget(lines.levels, limits, lines.cross_section_cm2_per_sr, errors, source, "shifts")
 
@@ -177,7 +185,7 @@ class RamanAnswer(TextOf):
             "min_relative": self.request.min_relative,
             "line_count": len(lines),
             "hyperfine": hyperfine_facts(lines.top, lines.levels),
-            **limit_facts(lines.top, populated_j(lines.top, lines.temperature_k), lines.levels.effects),
+            **limit_facts(lines.top, self.typical_j, lines.levels.effects),
             "errors": self.errors.as_json(),
         }
 

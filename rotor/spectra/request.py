@@ -30,7 +30,7 @@ from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.intensity_accuracy import cut_knob
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
-from rotor.thermodynamics.sums.classical_limit import populated_j
+from rotor.thermodynamics.sums.classical_limit import typical_j
 from rotor.thermodynamics.sums.partition_table import partition_facts
 from rotor.thermodynamics.vibration import VibrationalStates, missing_fundamentals
 from rotor.thermodynamics.vibration_input import vibrations_field
@@ -283,10 +283,9 @@ class SpectrumAnswer(TextOf):
 
     @property
     def typical_j(self) -> int:
-        """The J at which effects are compared: the most populated J, or the highest of the listed lines if that is lower."""
+        """The J at which effects are compared."""
         lines = self.lines
-        highest = int(lines.levels.rotational[lines.upper].max()) if len(lines) else lines.jmax
-        return min(populated_j(lines.top, lines.temperature_k), max(highest, 1))
+        return typical_j(lines.top, lines.temperature_k, lines.levels.rotational[lines.upper], lines.jmax)
 
     @property
     def why_no_lines(self) -> str:

@@ -227,11 +227,10 @@ def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
 def _limits(answer: EmissionAnswer, with_spins: str) -> list[tuple[str, str]]:
     """Neglected effects: of the source, and the largest of each molecule; of many molecules, those of the largest."""
     from rotor.quantum.estimates.limits import model_limits
-    from rotor.thermodynamics.sums.classical_limit import populated_j
 
     request, largest = answer.request, []
-    for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
-        limits = model_limits(top, populated_j(top, source.excitation_k), lines.effects) if isinstance(top, Top) else ()
+    for name, top, lines in zip(request.names, request.molecules, answer.emitted, strict=True):
+        limits = model_limits(top, lines.typical_j, lines.effects) if isinstance(top, Top) else ()
         largest += [(name, limit) for limit in limits[:1]]
     if len(largest) >= MOST_LEFT_OUT:
         largest.sort(key=lambda pair: -(pair[1].size or 0.0))

@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.effects.watson import centrifugal_operators
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
@@ -296,3 +296,11 @@ def populated_j(top: Top, temperature_k: float) -> int:
     _, b, c = top.rotational_constants_mhz
     ratio = temperature_k * units.MHZ_PER_K / ((b + c) / 2)
     return max(1, round(math.sqrt(ratio / 2 if top.kind == "linear" else ratio) - 0.5))
+
+
+def typical_j(top: Top, temperature_k: float, listed: Ints, jmax: int) -> int:
+    """The J at which effects on lines are compared: the most populated J, or the highest of the listed lines if that is lower.
+
+    listed: J of the lines. jmax: of the levels, for a list without lines.
+    """
+    return min(populated_j(top, temperature_k), max(int(listed.max()) if len(listed) else jmax, 1))

@@ -247,6 +247,10 @@ def test_effects_are_compared_at_the_j_of_the_listed_lines(call):
     out = call("spectrum", "HCONH2", "--range", "84.5:84.6GHz")[1]
     assert "effects   at J = 4: " in out
     assert "left out about 2.9 MHz (nuclear quadrupole" in out
+    source = ("--column", "1e15", "--excitation", "300K", "--range", "84.5:84.6GHz")
+    out = call("emission", "HCONH2", *source)[1]  # a shift by 19 MHz at J = 24, all of the line
+    assert "left out about 1.2 K (nuclear quadrupole)" in out
+    assert "effects   at J = 4: " in call("raman", "N2", "--jmax", "4")[1]  # the most populated is 7
 
 
 @pytest.mark.parametrize(
