@@ -67,6 +67,8 @@ class Assignments(Table):
     def from_rows(cls, names: Sequence[str], rows: ArrayLike, source: str = "rows") -> Assignments:
         """Lines from rows of numbers: labels of the upper state, of the lower state, frequency and error (MHz).
 
+        A missing error (NaN) is 0, as that of an empty cell in a file: such a line does not count in a fit.
+
         >>> Assignments.from_rows(["j"], [(1, 0, 115271.2018, 0.0005)]).columns["j_upper"].tolist()
         [1]
         """
@@ -84,7 +86,7 @@ class Assignments(Table):
             labels[:, :k],
             labels[:, k:],
             table[:, -2],
-            table[:, -1],
+            np.where(np.isnan(table[:, -1]), 0.0, table[:, -1]),
             np.ones(n),
             np.arange(n),
             np.zeros(n, dtype=bool),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+import rotor
 from rotor.fitting.assignment import assignments, duplicates, merged
 from rotor.fitting.choose import choose_constants, promised, suggest_lines, try_constants
 from rotor.fitting.criteria import chi_squared
@@ -218,6 +221,21 @@ def test_lines_without_an_error_are_left_out_openly_or_given_one():
     none = assignments(ASYMMETRIC, lines.upper, lines.lower, lines.frequency_mhz, 0.0)
     with pytest.raises(ValueError, match="all lines have an error of 0"):
         fit_lines(none, TRUE, parameters(TRUE, ["A"]))
+
+
+def test_rows_without_an_error_do_not_count(tmp_path):
+    """A missing error of a row is that of an empty cell in a file."""
+    rows = [(1, 0, 115271.202, 0.01), (2, 1, 230538.0, math.nan), (3, 2, 345795.99, 0.01), (4, 3, 461040.77, 0.01)]
+    (tmp_path / "lines.csv").write_text(
+        "j_upper,j_lower,frequency_mhz,error_mhz\n"
+        + "".join(f"{a},{b},{f},{'' if e != e else e}\n" for a, b, f, e in rows)
+    )
+    of_rows, of_file = (
+        rotor.fit(lines, constants="B=57635 D=0.18 MHz", free=["B", "D"])
+        for lines in (rows, str(tmp_path / "lines.csv"))
+    )
+    assert of_rows.table.value_mhz.tolist() == of_file.table.value_mhz.tolist()
+    assert of_rows.notes == of_file.notes == ("line 2, 2 - 1 at 230538.0000 MHz, does not count: its error is 0",)
 
 
 # Blends, ties, units

@@ -64,8 +64,10 @@ def _abridged(notes: list[str], further: str) -> list[str]:
 def _empty_states(coded: CodedFile) -> list[str]:
     """A note for each state beyond the first without parameters of its own, whose levels are those of another state."""
     named = {v for digits in coded.digits for v in digits.states or ()} | coded.members
+    shared = any(digits.states is None for digits in coded.digits)
+    others = "alone those of all states" if shared else "and no parameter is of all states"
     return [
-        f"state {v} has no parameter of its own, not even an energy (V1 = V2 = {v}), alone those of all states; NVIB says that it exists"
+        f"state {v} has no parameter of its own, not even an energy (V1 = V2 = {v}), {others}; NVIB says that it exists"
         for v in range(1, len(coded.states))
         if v not in named
     ]

@@ -90,6 +90,21 @@ def test_a_mistake_in_a_prediction_is_named_with_its_file(call, par: str, reques
             INT,
             "state 2 has no parameter of its own, not even an energy (V1 = V2 = 2), alone those of all states",
         ),
+        (
+            PAR.replace("a 1 2", "a 1 20").partition("     11")[0],
+            INT,
+            "parameter 10099 is left out, as SPCAT does: it reads V1 = 99, V2 = 0; with NVIB = 20 a state has 2 digits",
+        ),
+        (
+            PAR.replace("a 1 2", "a 1 100").partition("     11")[0].replace("0099", "009999"),
+            INT,
+            "parameter 1009999 is left out, as SPCAT does: it reads V1 = 999, V2 = 9; with NVIB = 100 a state has 3 digits",
+        ),
+        (
+            PAR.replace("a 1 2", "a 1 20").partition("     11")[0],
+            INT,
+            "state 1 has no parameter of its own, not even an energy (V1 = V2 = 1), and no parameter is of all states",
+        ),
     ],
 )
 def test_what_a_prediction_passes_over_is_said(call, par: str, request_text: str, said: str):

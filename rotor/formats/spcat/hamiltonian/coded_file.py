@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, file_codes
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, file_codes, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.codes import basis_axes
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator
@@ -200,10 +200,16 @@ class CodedFile:
     def left_out(self) -> list[str]:
         """A sentence for each parameter that SPCAT ignores: symmetry forbids it, or its spins or states do not exist."""
         reasons, count = list[str](), len(self.states)
+        digit_count = state_digits(count)
         for digits, parameter in zip(self.digits, self.file.parameters, strict=True):
             missing = digits.missing_state
             if missing is not None and parameter.value:
                 reasons.append(_left_out(parameter, f"state {missing} does not exist, NVIB = {count} counts from 0"))
+            # with fewer digits the code would be of all states
+            shorter = [split_code(parameter.code, 10**fewer - 1) for fewer in range(1, digit_count)]
+            if digits.is_place_holder and parameter.value and any(each.states is None for each in shorter):
+                why = f"with NVIB = {count} a state has {digit_count} digits, and {10**digit_count - 1} stands for all states"
+                reasons.append(_left_out(parameter, f"it reads V1 = {digits.v1}, V2 = {digits.v2}; {why}"))
         return reasons + self._selected[2]
 
     def _concerned(self, line: CodedLine) -> list[tuple[int, int]]:
