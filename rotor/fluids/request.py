@@ -241,7 +241,8 @@ def answer_fluid(
             from rotor.fluids.engines.follow import check_engine
 
             check_engine(request.engine, atoms, settings, outputs, request.threads)
-        with progress_bar(progress) as shown:
+        most = "at most " if request.equilibration_ps is None else ""
+        with progress_bar(progress, f"equilibration: {{task.completed}} of {most}{{task.total}} steps") as shown:
             equilibration = equilibrate(atoms, settings, request.equilibration_ps, shown)
         start += f"; {equilibration.text}"
     if not built_in:

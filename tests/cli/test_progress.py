@@ -72,6 +72,19 @@ def test_a_bar_takes_the_place_of_the_time(monkeypatch):
     assert progress._Display.bars == 0
 
 
+def test_the_bar_of_a_fluid_names_its_equilibration(monkeypatch):
+    """The steps of the longest equilibration were shown as those of the run: of 50000."""
+    from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
+    from rotor.fluids.settings import Settings
+
+    terminal = on_terminal(monkeypatch)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "200")
+    box = NewBox(27, equilibration_ps=0.1)
+    answer_fluid(FluidRequest(box, Settings("argon", temperature_k=90.0, steps=100, every=50, cutoff_angstrom=4.0)))
+    assert "equilibration: 50 of 50 steps" in terminal.getvalue()
+
+
 def test_a_prediction_from_an_int_file_shows_its_time_and_notes_begin_a_line(monkeypatch, folder):
     """Such files are predicted where inputs are read: predictions of minutes showed nothing."""
     from rotor import cli
