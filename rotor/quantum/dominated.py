@@ -24,8 +24,9 @@ REPEATS = 2  # of the correction
 SMALLEST_GAP = 1e-3  # MHz, in place of smaller denominators
 SMALL = 150  # size up to which all states are solved as fast
 ORTHOGONAL = 1e-13  # overlap of new functions with the space, which moves energies of 1e8 MHz by its square
-SHARE = 0.05  # of the functions that are chosen, above which they are: 0.5 to 1 of the time at 0.04, 2 at 0.08 (two tops, J = 26)
-SPACE = 0.2  # of the functions in the space, above which they are too: functions at the energies of states make it grow
+# largest share of chosen functions; with more, all states are solved: 0.5 to 1 of that time at 0.04, twice at 0.08 (two tops, J = 26)
+SHARE = 0.05
+SPACE = 0.2  # largest share of functions in the space, which grows where functions lie at the energies of states
 
 
 def is_dominated(size: int, count: int) -> bool:

@@ -5,10 +5,10 @@ In the rho-axis frame (RAM) z is along ρ and the rotational constants of the to
     H = A Pa² + B Pb² + C Pc² + D_ab {Pa, Pb} + F (p - ρPa)² + ½V3 (1 - cos 3α) + ...,
 
 A beside F (p - ρPa)². In the principal-axis frame (PAM, as XIAM has it) the rotational constants and distortion are those of the principal
-axes, F0 = ħ²/2I_α of the top alone, delta is the angle of its axis from a, and epsilon (0 if missing) that of the plane of both about a,
-from b: π/2 for an axis in the plane ac. The names of further terms are in
-`rotor.quantum.internal_rotation.terms`. Two or three tops are given in the PAM, with the number of the top behind each name: F0_1, delta_1,
-epsilon_1 (about a, from b), V3_1, V6_1, F0_2 ..., and V12, V12s (V13 ...) for what couples them.
+axes, F0 = ħ²/2I_α of the top alone, delta is the angle between its axis and a, and epsilon (0 if missing) the angle about a from b to the
+axis: 0 in the plane ab, π/2 in ac. The names of further terms are in `rotor.quantum.internal_rotation.terms`. Two or three tops are given
+in the PAM, with the number of the top behind each name: F0_1, delta_1, epsilon_1, V3_1, V6_1, F0_2 ..., and their coupling by V12, V12s
+(V13 ...).
 Constants without a stated frame are refused.
 """
 
@@ -110,9 +110,9 @@ class InternalRotationConstants:
 
     values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM" or "PAM".
     vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions retained for each K; 0 stands for 9, and for
-    25 products of two tops, 60 of three. spin_states: 2I + 1 of
-    each nucleus that turns, 2 of hydrogen. names: "K", of a top that turns nearly freely E levels by the signed K that they mostly are;
-    "energy", Ka and Kc counted by energy inside each v_t, as westerfit and BELGI (A levels) do, which is another order for such a top.
+    25 products of two tops, 60 of three. spin_states: 2I + 1 of each nucleus of the top, 2 of hydrogen. names: "K", E levels of a nearly
+    free top are named by the signed K of largest weight; "energy", Ka and Kc are counted by energy inside each v_t, as westerfit and BELGI
+    (A levels) do, which is another order for such a top.
     exchanged: of two equivalent tops 2I + 1 of the nuclei of each further pair that goes over into itself when they are exchanged, (2,) of
     propane with the hydrogens of CH2. uncertainties: in MHz (of rho without a unit). source: where the values are from.
 

@@ -27,7 +27,7 @@ ROTATION = ("rigid rotor", "centrifugal distortion")  # effects whose constants 
 
 @dataclass(frozen=True, eq=False)
 class InternalRotation(QuantumEffect):
-    """Internal rotation of one threefold group, or of two."""
+    """Internal rotation of one to three threefold groups."""
 
     name: ClassVar[str] = "internal rotation"
     conserved: ClassVar[frozenset[str]] = frozenset({"j"})

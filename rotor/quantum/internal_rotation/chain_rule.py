@@ -22,7 +22,7 @@ from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.several_tops import SeveralTops
 from rotor.quantum.internal_rotation.terms import Axes
 
-TILT = "tilt "  # before x or y: the angle by which ρ turns towards this axis of its frame
+TILT = "tilt "  # prefix of x or y: the angle by which ρ turns towards this axis of its frame
 RELATIVE_STEP, ANGLE_STEP = 1e-5, 1e-5  # steps (angles in radians) at which central differences are exact to 1e-10
 
 
