@@ -19,6 +19,7 @@ from rotor.tops.operators import distortion_terms
 
 FAR_OFF = 3.0  # errors beyond which a line is listed as far off
 _LISTED, _FEW_LISTED = 20, 5  # most lines that are listed as far off; and where most lines are
+_OUTLIER = 0.1  # a line without which the weighted rms falls below this part of it is an outlier
 _CORRELATED = 0.95  # correlation from which a pair is listed
 _INFLUENTIAL = 10  # most influential lines that are listed
 _MOVED = 3  # constants listed for each of them
@@ -114,6 +115,7 @@ def statistics_text(fit: Fit) -> list[str]:
         f"not determined by these lines: {combination.text}" + (" (left at the start)" if fit.converged else "")
         for combination in fit.statistics.undetermined
     ]
+    out += [f"outlier, {text}" for text in outlier(fit)]
     out += [f"far off, {text}" for text in far_off(fit)]
     out += [f"influential, {text}" for text in influential(fit)]
     return out + [f"decisive, {text}" for text in decisive(fit)]
@@ -167,6 +169,28 @@ def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
         f"line {fit.lines.number(int(fit.groups[i]))}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors"
         for i in order[:most]
     ] + more
+
+
+def outlier(fit: Fit) -> list[str]:
+    """The measured frequency that alone makes the fit poor, if there is one.
+
+    Without it χ² is less by r²/(1 - h), r its weighted residual and h its leverage: exact for a linear model, by the Sherman-Morrison
+    formula for JᵀJ without one row.
+    """
+    count = len(fit.groups)
+    if count < 2 or fit.degrees_of_freedom < 2:
+        return []
+    checked = np.maximum(1.0 - fit.statistics.leverages[:count], 1e-3)  # nothing checks a line of leverage 1
+    decrease = fit.residuals[:count] ** 2 / checked
+    i = int(np.argmax(decrease))
+    rms = math.sqrt(max(float(fit.residuals @ fit.residuals - decrease[i]), 0.0) / (count - 1))
+    if rms > _OUTLIER * fit.weighted_rms or abs(fit.residuals[i]) < FAR_OFF:
+        return []
+    place = int(fit.groups[i])
+    return [
+        f"line {fit.lines.number(place)}, {fit.lines.text(place)}: without it the weighted rms is about {rms:.2g}; check its "
+        "frequency and assignment"
+    ]
 
 
 def mostly_off(fit: Fit, errors: float = FAR_OFF) -> bool:

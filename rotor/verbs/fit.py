@@ -256,10 +256,10 @@ def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
 
 
 def _advice(fit: Fit) -> list[tuple[str, str]] | None:
-    """What may help a fit that failed with most lines far off: distortion constants that are not free."""
-    from rotor.fitting.report import mostly_off, quartics_not_free
+    """What may help a fit that failed with most lines far off, not because of a single one: distortion constants that are not free."""
+    from rotor.fitting.report import mostly_off, outlier, quartics_not_free
 
-    names = "" if fit.converged or not mostly_off(fit) else ",".join(quartics_not_free(fit))
+    names = "" if fit.converged or not mostly_off(fit) or outlier(fit) else ",".join(quartics_not_free(fit))
     if not names:
         return None
     text = (

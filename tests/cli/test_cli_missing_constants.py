@@ -62,6 +62,26 @@ def test_a_fit_without_distortion_names_what_is_missing(call: Call, folder: Path
     assert "CONVERGED" in out.splitlines()[0]
 
 
+def test_a_line_that_alone_makes_the_fit_poor_is_named(call: Call, folder: Path) -> None:
+    """A line 10,000 errors off takes most lines along; the advice was to free constants of distortion."""
+    write_lines(folder / "l.csv", "A")
+    text = " ".join(f"{name}={value}" for name, value in QUARTICS["A"].items())
+    start = ("--constants", f"{RIGID.removesuffix(' MHz')} {text} MHz", "--free", "A,B,C")
+    head, *rows = (folder / "l.csv").read_text().splitlines()
+    place = next(i for i, row in enumerate(rows) if row.startswith("2,1,1,2,0,2,"))
+    cells = rows[place].split(",")
+    shifted = ",".join([*cells[:6], f"{float(cells[6]) + 30:.4f}", cells[7]])
+    (folder / "off.csv").write_text("\n".join([head, *rows[:place], shifted, *rows[place + 1 :]]) + "\n")
+    (folder / "without.csv").write_text("\n".join([head, *rows[:place], *rows[place + 1 :]]) + "\n")
+    assert call("fit", "without.csv", *start, "--json", "f.json")[0] == 0
+    rms = json.loads((folder / "f.json").read_text())["weighted_rms"]
+    code, out, _ = call("fit", "off.csv", *start)
+    assert code == 1
+    said = f"outlier, line {place + 1}, 2 1 1 - 2 0 2: without it the weighted rms is about "
+    assert float(" ".join(out.split()).partition(said)[2].split(";")[0]) == pytest.approx(rms, rel=0.1)
+    assert "most lines are off" not in out
+
+
 def test_a_trial_that_is_not_better_says_why(call: Call, folder: Path) -> None:
     """The cell was "no" beside F = 592 and a much lower AICc where the fit has an rms above 10."""
     write_lines(folder / "l.csv", "S")
