@@ -13,10 +13,11 @@ from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
 from rotor.scenes.run import Where, files_of, scene_calculation
 from rotor.scenes.scene import Scene, checked_scene
-from rotor.scenes.sweep.points import is_sweep
+from rotor.scenes.sweep.points import Points, is_sweep, points, text_of
 from rotor.verbs.calculation import Calculation, NoResultError
 from rotor.verbs.verb import Verb
 
+MOST_POINTS = 20  # of a sweep: each is planned
 SHARE = 0.1  # of the model or data error: a smaller numerical error does not matter
 SHORT_RUN, SMALL_MB = 1.0, 500.0  # seconds and memory up to which a scene is run for its plan
 
@@ -27,7 +28,7 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     Parameters
     ----------
     scene : Scene
-        Without a sweep.
+        Of a sweep, the longest of its points is planned; 20 points at most.
     folder : path
         Folder of the files that the scene reads.
     out : path
@@ -49,12 +50,23 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     {'levels': 11}
     """
     checked_scene(scene)
-    if scene.sweep:
-        raise ValueError("sweep: a plan is of a single calculation; remove the sweep from the scene to plan one point")
     if is_sweep(scene, folder):
-        raise ValueError("molecule: a list of molecules; a plan is of one: name a molecule of the list in its place")
+        return _plan_of_sweep(points(scene, folder), folder, out)
     files_of(scene, out)
     return plan_of_calculation(scene_calculation(scene, folder))
+
+
+def _plan_of_sweep(sweep: Points, folder: Where, out: Where) -> Plan:
+    """The plan of the point that takes longest, with the time of all points."""
+    if len(sweep) > MOST_POINTS:
+        raise ValueError(
+            f"sweep: {len(sweep)} points, of which {MOST_POINTS} at most are planned: give fewer values or molecules for the plan"
+        )
+    planned = [(point, plan_of(point.scene, folder, out)) for point in sweep]
+    point, longest = max(planned, key=lambda pair: pair[1].seconds)
+    seconds = sum(plan.seconds for _, plan in planned)
+    text = f"{len(sweep)}, {seconds:.2g} s of processor time together; this is the longest: {text_of(point.values)}"
+    return replace(longest, parts=(("points", text), *longest.parts))
 
 
 def plan_of_calculation(calculation: Calculation) -> Plan:

@@ -1,5 +1,7 @@
 """What a run refuses, its plan refuses, in the same words; what a run does, its plan does not refuse."""
 
+import re
+
 import pytest
 
 HEAD = 'schema = 1\nkind = "{}"\n'
@@ -75,10 +77,19 @@ def test_a_plan_says_that_a_fit_reaches_no_result(call, folder):
     assert call("run", "s.toml")[0] == 1
 
 
-def test_a_plan_of_a_list_of_molecules_says_that_it_is_of_one(call, folder):
+def test_a_plan_of_a_sweep_is_of_its_longest_point(call, folder):
+    """Swept values and lists of molecules; each point is planned, so that there may not be many."""
+    scene = HEAD.format("levels") + 'molecule = "{}"\n'
+    (folder / "s.toml").write_text(scene.format("water") + '[sweep]\n"observables.jmax" = [2, 60]\n')
+    code, out, err = call("plan", "s.toml")
+    assert code == 0, err
+    out = " ".join(out.split())
+    assert re.search(r"points 2, \S+ s of processor time together; this is the longest: observables.jmax = 60", out)
     (folder / "list.csv").write_text("name\nCO\nHCl\n")
-    (folder / "s.toml").write_text(HEAD.format("levels") + 'molecule = "list.csv"\n')
+    (folder / "s.toml").write_text(scene.format("list.csv"))
+    assert "points 2, " in " ".join(call("plan", "s.toml")[1].split())
+    (folder / "list.csv").write_text("name\n" + "CO\n" * 21)
     code, _, err = call("plan", "s.toml")
     assert (code, err) == (
-        2, "error: molecule: a list of molecules; a plan is of one: name a molecule of the list in its place\n",
+        2, "error: sweep: 21 points, of which 20 at most are planned: give fewer values or molecules for the plan\n",
     )  # fmt: skip
