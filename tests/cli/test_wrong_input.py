@@ -158,7 +158,7 @@ FAMILY = 'name = "OCS"\n[[isotopologue]]\nconstants = "B=6081.492 MHz"\n[[isotop
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("info H20", "did you mean H2O, "),
+        ("info H20", "did you mean H2O? "),
         ("info h2o", "did you mean H2O? "),
         ("spectrum CH3CHO --internal-rotation table", "; or the word geometry or scan, with values behind it"),
         ("info family.toml", "family.toml: a family of isotopologues, not one molecule; rotor structure reads it"),
