@@ -139,13 +139,29 @@ def matching_rows(table: Sequence[NDArray[Any]], keys: Sequence[NDArray[Any]]) -
     >>> matching_rows([np.array([1, 2]), np.array(["a", "b"])], [np.array([2, 3]), np.array(["b", "a"])]).tolist()
     [1, -1]
     """
-    count, code = len(table[0]), np.zeros(len(table[0]) + len(keys[0]), dtype=np.int64)
+    count, codes = len(table[0]), 1
+    code = np.zeros(count + len(keys[0]), dtype=np.int64)
     for both in zip(table, keys, strict=True):
-        _, place = np.unique(np.concatenate(both), return_inverse=True)
-        _, code = np.unique(code * (int(place.max(initial=0)) + 1) + place, return_inverse=True)
-    row_of_code = np.full(int(code.max(initial=-1)) + 1, -1)
-    row_of_code[code[:count][::-1]] = np.arange(count)[::-1]
-    return np.asarray(row_of_code[code[count:]])
+        number, size = _numbers_from_zero(np.concatenate(both))
+        if codes * size > LARGEST_CODE:
+            code, codes = _numbers_from_zero(np.unique(code, return_inverse=True)[1])
+        code, codes = code * size + number, codes * size
+    order = np.argsort(code[:count], kind="stable")
+    place = np.searchsorted(code[order], code[count:])
+    row = np.append(order, -1)[place]
+    return np.where((row >= 0) & (code[row] == code[count:]), row, -1)
+
+
+LARGEST_CODE = 2**62
+
+
+def _numbers_from_zero(values: NDArray[Any]) -> tuple[Ints, int]:
+    """Whole numbers from 0 that distinguish values, and the number after the largest."""
+    if values.dtype.kind in "iu" and len(values):
+        low = int(values.min())
+        return np.asarray(values - low, dtype=np.int64), int(values.max()) - low + 1
+    place = np.unique(values, return_inverse=True)[1]
+    return place.astype(np.int64), int(place.max(initial=0)) + 1
 
 
 def end_to_end(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -321,6 +321,17 @@ class TransitionTable(Table):
         return self.levels.quanta_of(rows)
 
 
+def energies_like(reference: Levels, levels: Levels) -> Floats:
+    """Energies of `levels` in the rows of a reference, matched by the quantum numbers that both have; NaN for a missing level.
+
+    J and N, the rotational angular momentum, are matched with each other.
+    """
+    shared = [name for name in reference.quanta_names if name in levels.quanta_names and name not in ("n", "j")]
+    table, keys = ([each.rotational, *(each.quanta[name] for name in shared)] for each in (levels, reference))
+    rows = matching_rows(table, keys)
+    return np.where(rows >= 0, levels.energy_mhz[rows], np.nan)
+
+
 def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
     """Spin weights of levels by other weights than they were solved with; species have theirs where the weights are all 1."""
     species = "species" in levels.quanta and weights.rule == "none"

@@ -11,13 +11,13 @@ from rotor.quantum.estimates.accuracy import (
     SHORT_J,
     by_blocks,
     distortion,
-    energies_like,
     hyperfine,
     largest,
     levels_error,
     rounding_of,
 )
 from rotor.quantum.estimates.plans import effect_texts, level_parts, neglected_in_levels, plan_fields
+from rotor.quantum.levels import energies_like
 from rotor.requests.budget import ErrorTerm
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics

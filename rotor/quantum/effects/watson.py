@@ -39,6 +39,20 @@ def operators_of_name(constants: Constants, name: str) -> Operators:
     return table[name] if name in table else {_powers(name): 1.0}
 
 
+def order_of_constant(name: str, constants: Constants) -> int:
+    """Power of J in the operator of a constant: 2 for A, 4 for DeltaJ."""
+    return max(2 * sum(powers) for powers in operators_of_name(constants, name))
+
+
+def to_order(top: Top, order: int) -> Top:
+    """A top without the constants whose operators have a higher power of J."""
+    constants = top.constants
+    above = {
+        name: None for name in constants.values if name not in "ABC" and order_of_constant(name, constants) > order
+    }
+    return top.with_constants(constants.replace(**above))
+
+
 def _powers(name: str) -> Powers:
     """Powers (p, q, n) of a name that spells its operator."""
     powers = spelled_powers(name)

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, matching_rows
+from rotor.arrays import Floats
+from rotor.quantum.effects.watson import order_of_constant, to_order
 from rotor.quantum.estimates.plans import describe_levels
+from rotor.quantum.levels import energies_like
 from rotor.requests.budget import ErrorTerm
 from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics, numerical_error
@@ -96,17 +98,6 @@ def levels_error(answer: Any, top: Any, levels: Any) -> float:
     return numerical_error(answer) + (0.0 if has_spins else _spin_size(top))
 
 
-def energies_like(reference: Levels, levels: Levels) -> Floats:
-    """Energies of `levels` in the rows of a reference, matched by the quantum numbers that both have; NaN for a missing level.
-
-    J and N, the rotational angular momentum, are matched with each other.
-    """
-    shared = [name for name in reference.quanta_names if name in levels.quanta_names and name not in ("n", "j")]
-    table, keys = ([each.rotational, *(each.quanta[name] for name in shared)] for each in (levels, reference))
-    rows = matching_rows(table, keys)
-    return np.where(rows >= 0, levels.energy_mhz[rows], np.nan)
-
-
 def level_error(levels: Levels, reference: Levels) -> float:
     """The largest difference of an energy in MHz; infinite if no level is in both."""
     return largest(energies_like(reference, levels) - reference.energy_mhz)
@@ -118,23 +109,10 @@ def largest(differences: Floats) -> float:
     return float(sizes.max()) if len(sizes) else math.inf
 
 
-def order_of(name: str, top: Top) -> int:
-    """Power of J in the operator of a constant: 2 for A, 4 for DeltaJ."""
-    from rotor.quantum.effects.watson import operators_by_name
-
-    return max(2 * sum(powers) for powers in operators_by_name(top.constants)[name])
-
-
-def to_order(top: Top, order: int) -> Top:
-    """A top without the constants whose operators have a higher power of J."""
-    above = {name: None for name in top.constants.values if name not in "ABC" and order_of(name, top) > order}
-    return top.with_constants(top.constants.replace(**above))
-
-
 def _orders(request: Any) -> list[int]:
     """Powers of J in the operators of the constants."""
     top = request.top
-    return [2, *sorted({order_of(name, top) for name in top.constants.values if name not in "ABC"})]
+    return [2, *sorted({order_of_constant(name, top.constants) for name in top.constants.values if name not in "ABC"})]
 
 
 def _without_orders(request: Any) -> str | None:

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators
-from rotor.quantum.estimates.accuracy import energies_like, to_order
-from rotor.quantum.levels import Levels
+from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators, to_order
+from rotor.quantum.levels import Levels, energies_like
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
 from rotor.tops.operators import REPRESENTATIONS
