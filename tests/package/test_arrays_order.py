@@ -41,3 +41,9 @@ def test_matching_rows_are_those_of_a_dictionary():
         expected = [first.get(key, -1) for key in zip(*(column[count:].tolist() for column in both), strict=True)]
         rows = matching_rows([column[:count] for column in both], [column[count:] for column in both])
         assert rows.tolist() == expected
+
+
+def test_a_code_beyond_64_bits_matches_no_other_row():
+    """5 · 2^64 is 0 in 64 bits."""
+    table = [np.array([0, 2**32 - 1])] * 3
+    assert matching_rows(table, [np.array([5, 0]), np.array([0, 0]), np.array([0, 0])]).tolist() == [-1, 0]
