@@ -92,16 +92,15 @@ def drawing(name: str) -> Callable[[Any, Path, Report], None]:
     """Function that draws a picture of `rotor.plots.spectra.over`."""
 
     def draw(answer: Any, path: Path, report: Report) -> None:
-        from rotor.plots.spectra import over
+        from rotor.plots.spectra.over import plot_over
         from rotor.plots.view import View
 
         comparison = compared(answer, report)
         view = View(*map(report.view.get, ("title", "range_mhz", "vertical", "log")))
-        getattr(over, name)(
-            comparison.lines, comparison.heights, comparison.peaks, path, view=view, provenance=report.command
-        )
+        lines, heights, peaks = comparison.lines, comparison.heights, comparison.peaks
+        plot_over(name, lines, heights, peaks, path, view=view, provenance=report.command)
 
     return draw
 
 
-draw_over, draw_loomis_wood = drawing("plot_over"), drawing("plot_loomis_wood")
+draw_over, draw_loomis_wood = drawing("over"), drawing("loomis_wood")

@@ -38,21 +38,6 @@ BESIDE_PEAKS = 0.02  # of the band, left and right of the outermost peaks
 LEAST_SHOWN = 1e-3  # relative to the strongest line in the band
 
 
-def plot_over(
-    lines: Lines,
-    heights: Floats,
-    peaks: PeakList,
-    path: str | os.PathLike[str],
-    *,
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw peaks with the lines mirrored below them; heights (lines,) in units of the peaks."""
-    checked_suffix(path)
-    title = view.title or f"{os.path.basename(peaks.source) or 'Spectrum'} and {top_title(lines.top)}"
-    save(over_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
-
-
 def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
     """A matplotlib figure of a spectrum, or of peaks without one, above the axis, and of lines below."""
     with styled():
@@ -117,21 +102,6 @@ def series_order(lines: Lines, rows: Ints) -> Ints:
     return np.asarray(rows[np.lexsort([*keys, j[0] - j[1]])], dtype=np.int64)
 
 
-def plot_loomis_wood(
-    lines: Lines,
-    heights: Floats,
-    peaks: PeakList,
-    path: str | os.PathLike[str],
-    *,
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw Loomis-Wood rows of the strongest lines."""
-    checked_suffix(path)
-    title = view.title or f"{os.path.basename(peaks.source) or 'Spectrum'} about lines of {top_title(lines.top)}"
-    save(loomis_wood_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
-
-
 def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
     """A matplotlib figure with a row for each of the strongest lines that shows the peaks near it, ordered by series.
 
@@ -160,3 +130,24 @@ def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: st
         axes.set_title(title, loc="left")
         show_part(axes, view)
         return figure
+
+
+# figure by the name of the picture, and what stands between spectrum and molecule in its title
+PICTURES = {"over": (over_figure, "and"), "loomis_wood": (loomis_wood_figure, "about lines of")}
+
+
+def plot_over(
+    name: str,
+    lines: Lines,
+    heights: Floats,
+    peaks: PeakList,
+    path: str | os.PathLike[str],
+    *,
+    view: View = WHOLE,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw a picture of `PICTURES`; heights (lines,) in units of the peaks."""
+    checked_suffix(path)
+    figure, between = PICTURES[name]
+    title = view.title or f"{os.path.basename(peaks.source) or 'Spectrum'} {between} {top_title(lines.top)}"
+    save(figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
