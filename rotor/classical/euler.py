@@ -90,14 +90,8 @@ def checked_moments(moments: ArrayLike) -> Floats:
 
 def checked_momentum(momentum: ArrayLike, moments: Floats) -> Floats:
     """Body angular momentum (..., 3), finite, with nothing along an axis whose moment is zero."""
-    array = np.asarray(momentum, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"angular momenta have shape (..., 3); got shape {array.shape}")
-    if not np.all(np.isfinite(array)):
-        raise ValueError("an angular momentum holds a number that is not finite")
-    if np.any((moments == 0.0) & (array != 0.0)):
-        raise ValueError("a linear rotor has no angular momentum about its own axis: set that component to 0")
-    return array
+    about_axis = "a linear rotor has no angular momentum about its own axis"
+    return _checked_vector(momentum, moments, "angular momenta", "an angular momentum", about_axis)
 
 
 def checked_velocity(omega: ArrayLike, moments: Floats) -> Floats:
@@ -106,11 +100,19 @@ def checked_velocity(omega: ArrayLike, moments: Floats) -> Floats:
     >>> checked_velocity([0.0, 1.0, 2.0], np.array([0.0, 3.0, 3.0])).tolist()
     [0.0, 1.0, 2.0]
     """
-    array = np.asarray(omega, dtype=np.float64)
+    about_axis = "a linear rotor does not rotate about its own axis"
+    return _checked_vector(omega, moments, "angular velocities", "an angular velocity", about_axis)
+
+
+def _checked_vector(vector: ArrayLike, moments: Floats, plural: str, singular: str, about_axis: str) -> Floats:
+    """A vector (..., 3), finite, with nothing along an axis whose moment is zero; the texts name it in errors."""
+    array = np.asarray(vector, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise ValueError(f"{plural} have shape (..., 3); got shape {array.shape}")
     if not np.all(np.isfinite(array)):
-        raise ValueError("an angular velocity holds a number that is not finite")
+        raise ValueError(f"{singular} holds a number that is not finite")
     if np.any((moments == 0.0) & (array != 0.0)):
-        raise ValueError("a linear rotor does not rotate about its own axis: set that component to 0")
+        raise ValueError(f"{about_axis}: set that component to 0")
     return array
 
 

@@ -90,9 +90,8 @@ def predicted_tolerance(sought: Sought) -> Prediction | None:
     if not _is_long(sought.request, sought.accuracy):
         return None
     _refuse_endless(sought.request, sought.accuracy)
-    return Prediction(
-        *_pilot(sought.request, sought.accuracy), 1.0 + 10.0 ** (FINER / ORDER)
-    )  # steps go with the tolerance to the power -1/8
+    cost = 1.0 + 10.0 ** (FINER / ORDER)  # steps go with the tolerance to the power -1/8
+    return Prediction(*_pilot(sought.request, sought.accuracy), cost)
 
 
 def _is_long(request: DrivenRequest, allowed: float) -> bool:

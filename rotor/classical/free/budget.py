@@ -27,10 +27,8 @@ EPS = sys.float_info.epsilon
 EVALUATED = 32 * EPS  # theta functions, and products of three quaternions
 DOUBLED = 64 * EPS**2  # of a phase in two doubles
 LAST_DIGITS = 4 * EPS  # error of k'² if six numbers each have an error of one unit in the last place
-SMALL_TURN, SMALLEST_CHANGE = (
-    1e-4,
-    1e-12,
-)  # rad by which a varied moment turns the attitude; relative change of a moment
+SMALL_TURN = 1e-4  # rad by which a varied moment turns the attitude
+SMALLEST_CHANGE = 1e-12  # of a moment, relative
 EXACT_INPUT = "moments and angular momentum have no stated uncertainty"
 
 
