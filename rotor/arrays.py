@@ -124,13 +124,18 @@ def numbers_in_runs(counts: Ints, firsts: Ints | int = 0) -> tuple[Ints, Ints]:
 
 
 def rows_of_keys(table: Ints, keys: Ints) -> Ints:
-    """The rows (n,) of keys (n, k) in a table (m, k) of whole numbers, -1 where there is none.
+    """The rows (n,) of keys (n, k) in a table (m, k) of whole numbers, the last of equal ones, -1 where there is none.
+
+    Quick for small tables; `matching_rows` is for large ones.
 
     >>> rows_of_keys(np.array([[1, 0], [2, 1]]), np.array([[2, 1], [3, 0]])).tolist()
     [1, -1]
     """
     row_of = {tuple(row): number for number, row in enumerate(table.tolist())}
     return np.array([row_of.get(tuple(key), -1) for key in keys.tolist()], dtype=np.int64)
+
+
+LARGEST_CODE = 2**62  # of a row, the columns of which are digits
 
 
 def matching_rows(table: Sequence[NDArray[Any]], keys: Sequence[NDArray[Any]]) -> Ints:
@@ -150,9 +155,6 @@ def matching_rows(table: Sequence[NDArray[Any]], keys: Sequence[NDArray[Any]]) -
     place = np.searchsorted(code[order], code[count:])
     row = np.append(order, -1)[place]
     return np.where((row >= 0) & (code[row] == code[count:]), row, -1)
-
-
-LARGEST_CODE = 2**62
 
 
 def _numbers_from_zero(values: NDArray[Any]) -> tuple[Ints, int]:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, distinct, rows_of_keys
+from rotor.arrays import Floats, Ints, distinct, matching_rows
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.unmeasured import measured_range, without_measured
 from rotor.formats.spcat.file_model import Group, connected_groups
@@ -250,12 +250,12 @@ def _assign_with_spins(
 
 def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
     """The row of each label among the levels, -1 if it has none."""
-    # of equal labels the first row counts
-    table = np.concatenate([listed_quanta(group, levels, form, negative) for negative in (True, False)])[::-1]
-    rows = rows_of_keys(table, labels)
+    table = np.concatenate([listed_quanta(group, levels, form, negative) for negative in (True, False)])
+    rows = matching_rows(list(table.T), list(labels.T))
     if form.rotation == 2:  # a label without a level is that of the opposite sign of K
-        rows = np.where(rows < 0, rows_of_keys(table * np.where(np.arange(table.shape[1]) == 1, -1, 1), labels), rows)
-    return np.where(rows < 0, -1, (len(table) - 1 - rows) % max(len(levels), 1))
+        opposite = table * np.where(np.arange(table.shape[1]) == 1, -1, 1)
+        rows = np.where(rows < 0, matching_rows(list(opposite.T), list(labels.T)), rows)
+    return np.where(rows < 0, -1, rows % max(len(levels), 1))
 
 
 def _assign_in_blocks(
