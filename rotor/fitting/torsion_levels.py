@@ -20,7 +20,6 @@ from rotor.fitting.top_constants import TopConstants
 from rotor.quantum.internal_rotation.chain_rule import TILT, ChainRule, chain_rule, further_operators
 from rotor.quantum.internal_rotation.hyperfine import (
     coupled_blocks,
-    refuse_across_plane,
     refuse_unlike_nuclei,
 )
 from rotor.quantum.internal_rotation.levels import (
@@ -163,8 +162,6 @@ def _with_spins(
     spins: Spins, part: LabelledSpecies, moments: TorsionMoments, terms: Terms, derivatives: Mapping[str, Terms]
 ) -> tuple[Floats, Floats, dict[str, Floats]]:
     """Energies of labels, and their derivatives by coefficients of the torsion-rotation and by those of terms with spins."""
-    if moments.model.has_plane:
-        refuse_across_plane(terms, moments.model.frame)
     quanta = moments.levels.quanta
     names = np.column_stack([np.arange(len(quanta["vt"])), quanta["ka"], quanta["kc"]])
     free = placed(species_rotors(moments, 1))

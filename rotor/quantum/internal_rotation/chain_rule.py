@@ -54,21 +54,19 @@ def chain_rule(model: RamModel | SeveralTops, values: Mapping[str, float]) -> Ch
     if isinstance(model, SeveralTops):
         angles = [name for name in values if name.startswith(("F0_", "delta_", "epsilon_"))]
         kinetic = [*kinetics_of_tops(values)]
-        along = model.slopes_by_rho((0,) * len(model.tops))
-        quantities = [name for name in kinetic if name in along or not name.startswith("rho")]
-        return _rule(kinetics_of_tops, values, quantities, [*"ABC", *angles])
+        return _rule(kinetics_of_tops, values, kinetic, [*"ABC", *angles])
     if "F0" not in values:
         return NO_CHAIN
     angles = [name for name in ("delta", "epsilon") if name in values]
-    tilts = [TILT + towards for towards in model.tilts]
     closed_form = partial(kinetics_of_one_top, frame=model.frame)
-    return _rule(closed_form, values, ["F", "rho", *tilts], [*"ABC", "F0", *angles])
+    return _rule(closed_form, values, ["F", "rho", f"{TILT}x", f"{TILT}y"], [*"ABC", "F0", *angles])
 
 
 def further_operators(model: RamModel | SeveralTops, species: str, chain: ChainRule) -> dict[str, list[Product]]:
     """∂H/∂q of the quantities that are not coefficients of the Hamiltonian."""
     if isinstance(model, SeveralTops):
-        return model.slopes_by_rho(model.species[species])
+        slopes = model.slopes_by_rho(model.species[species])
+        return {q: slopes[q] for q in chain.quantities if q in slopes}
     sigma = model.species[species]
     return {q: model.slope_by_tilt(q.removeprefix(TILT), sigma) for q in chain.quantities if q.startswith(TILT)}
 
@@ -95,10 +93,11 @@ def _rule(
     quantities: Sequence[str],
     constants: Sequence[str],
 ) -> ChainRule:
-    """Jacobian of closed forms by central differences."""
+    """Jacobian of closed forms by central differences, of quantities that a constant changes: ρ may stay in a plane."""
     jacobian = np.zeros((len(quantities), len(constants)))
     for column, name in enumerate(constants):
         step = ANGLE_STEP if name.startswith(("delta", "epsilon")) else RELATIVE_STEP * values[name]
         up, down = (closed_form({**values, name: values[name] + sign * step}) for sign in (1, -1))
         jacobian[:, column] = [(up[q] - down[q]) / (2 * step) for q in quantities]
-    return ChainRule(tuple(quantities), tuple(constants), jacobian)
+    moved = np.flatnonzero(jacobian.any(axis=1)).tolist()
+    return ChainRule(tuple(quantities[row] for row in moved), tuple(constants), jacobian[moved])

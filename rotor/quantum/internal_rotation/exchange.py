@@ -115,11 +115,11 @@ class ExchangedTops(TorsionRotation):
         rows, columns, values = (np.concatenate(part, axis=-1) for part in zip(*pieces, strict=True))
         return merged(plain.count, rows, columns, values)
 
-    def over_products(self, rows: Ints, vectors: NDArray[Any]) -> NDArray[Any]:
+    def over_products(self, rows: Ints, vectors: NDArray[Any], phases: bool = False) -> NDArray[Any]:
         """States over |J K⟩|K t⟩ (K, t, n), by way of the plain functions that occur in them."""
         combined = self._combined[0][:, rows]
         plain = np.unique(combined.nonzero()[0])
-        return super().over_products(plain, combined[plain] @ vectors)
+        return super().over_products(plain, combined[plain] @ vectors, phases)
 
     def symmetry_allowed(self, elements: Elements) -> Elements:
         """Elements of the full Hamiltonian without the round-off between functions of different x."""

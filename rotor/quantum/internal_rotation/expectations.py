@@ -38,6 +38,11 @@ class Expectations:
     operators: Sequence[Sequence[Product]]
 
     @cached_property
+    def needs_phases(self) -> bool:
+        """Whether an operator is imaginary in |J K⟩|K t⟩ and thus connects s = 1 with s = -1."""
+        return any(np.iscomplexobj(step.rotations) for step in self._steps)
+
+    @cached_property
     def _steps(self) -> list[_Step]:
         """Elements by torsional factor and step of K ≥ 0; other steps count twice instead."""
         factors = [(i, factor) for i, products in enumerate(self.operators) for factor in products]

@@ -4,8 +4,13 @@ The species σ = 0 goes to itself under time reversal; its functions are
 
     |J K t s) = i^J (|J K⟩|K t⟩ + s (-1)^K |J -K⟩|-K t⟩)/√2  (and i more for s = -1),   K > 0,       i^J |J 0⟩|0 t⟩,  s = parity of t,
 
-Operators of rank k that are real in |J K⟩|K t⟩ (a plane of symmetry contains the rho axis) connect s with s' = s (-1)^(J+J'+k). Elements
-of odd rank are stored without their factor i, as in `rotor.quantum.tensors`. Other species use |J K⟩|K t⟩.
+Operators of rank k that are real in |J K⟩|K t⟩ connect s with s' = s (-1)^(J+J'+k), imaginary ones connect s with -s'. Elements of odd
+rank are stored without their factor i, as in `rotor.quantum.tensors`; all are then real. Other species use |J K⟩|K t⟩.
+
+H is real if ρ and its tensors lie in a plane of two principal axes, y across it; s (-1)^J is then good. The molecule may have this plane
+as a mirror or not: a mirror excludes components of dipoles and spin tensors with an odd number of y, which are the imaginary ones, and
+without it they are allowed beside the same levels. Terms of H across the plane (Dac, Dbc of ρ along a) mix s; with them |J K⟩|K t⟩
+serve all species.
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,7 +33,7 @@ from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Produc
 class TorsionRotation:
     """The functions of one species with J from `jmin` to `jmax`.
 
-    folded: whether functions of K and -K are combined, which needs σ = 0 and a real Hamiltonian.
+    folded: whether functions of K and -K are combined, which needs σ = 0; s is a symmetry of a real Hamiltonian.
     """
 
     torsion: ContractedTorsion
@@ -92,18 +98,21 @@ class TorsionRotation:
         if half:
             plain = self._lower(plain, rank)
         if self.folded:
-            if np.iscomplexobj(plain.values):
-                raise ValueError("functions of K and -K are combined for real operators only")
             return self._gathered(len(terms), *self._folded(terms, plain, (rank + time_odd) % 2))
         change = self._k(plain.rows) - self._k(plain.columns)
         values = self._values(terms, plain, np.arange(len(change)), change)
         rows, columns = self._rows[0][plain.rows], self._rows[0][plain.columns]
         return self._gathered(len(terms), rows, columns, values)
 
-    def over_products(self, rows: Ints, vectors: NDArray[Any]) -> NDArray[Any]:
-        """States (functions, n) of one J over the functions at some rows as states over |J K⟩|K t⟩ (K, t, n), but for a common phase."""
+    def over_products(self, rows: Ints, vectors: NDArray[Any], phases: bool = False) -> NDArray[Any]:
+        """States (functions, n) of one J over the functions at some rows as states over |J K⟩|K t⟩ (K, t, n), but for a common phase.
+
+        phases: with the factor i of s = -1, which matters to operators that connect s = 1 with s = -1.
+        """
         j, k, t, s = (self.plain_labels[name][rows] for name in ("J", "K", "t", "s"))
         size = 2 * int(j[0]) + 1
+        if phases and self.folded:
+            vectors = vectors * np.where(s < 0, 1j, 1.0)[:, None]
         states = np.zeros((size, self.torsion.count, vectors.shape[1]), dtype=vectors.dtype)
         states[j + k, t] = vectors
         if self.folded:
@@ -150,7 +159,8 @@ class TorsionRotation:
         """Rows and columns (entries, t), and values, between combined functions.
 
         ⟨J'|K'| t' s'|O|J K t s) = w' w Σ_±K' (s' (-1)^K')^[K' < 0] ⟨K' t'|O|K t⟩ over both signs of K', with K ≥ 0, w = √2 for K > 0 and
-        w' = 1/√2 for K' > 0 (1 otherwise), times i^(J - J') and the factors i of s and s'.
+        w' = 1/√2 for K' > 0 (1 otherwise), times i^(J - J') and the factors i of s and s'. Imaginary parts of ⟨K' t'|O|K t⟩ have one more
+        factor i and the opposite s'.
         """
         chosen = np.flatnonzero(self._k(plain.columns) >= 0)
         rows, columns = plain.rows[chosen], plain.columns[chosen]
@@ -159,24 +169,23 @@ class TorsionRotation:
         values = self._values(terms, plain, chosen, k_row - k_column)
         weight = np.where(k_column > 0, np.sqrt(2), 1.0) * np.where(k_row != 0, np.sqrt(0.5), 1.0)
         target = self.rotation.rows({"J": j_row, "K": np.abs(k_row)})
-        odd = (j_row + j_column + parity) % 2  # whether the sign s changes
-        phase = (j_column - j_row) % 4
+        phase = (j_column - j_row - parity) % 4  # powers of i; odd ranks are stored without one factor i
         pairs, slots = np.unique(target * len(self.rotation) + columns, return_inverse=True)
         first, second = pairs // len(self.rotation), pairs % len(self.rotation)
+        parts = [(0, values.real), (1, values.imag)] if np.iscomplexobj(values) else [(0, values)]
         pieces = []
-        for column_sign in (1, -1):
+        for (imaginary, part), column_sign in product(parts, (1, -1)):
+            odd = (j_row + j_column + parity + imaginary) % 2  # whether the sign s changes
             row_sign = np.where(odd, -column_sign, column_sign)
             reflected = np.where(k_row < 0, row_sign * np.where(k_row % 2, -1, 1), 1)
-            turns = (
-                phase + (column_sign < 0) - (row_sign < 0) - parity
-            ) % 4  # powers of i; odd ranks are stored without one factor i
+            turns = (phase + imaginary + (column_sign < 0) - (row_sign < 0)) % 4
             factor = weight * reflected * np.where(turns == 0, 1.0, -1.0)
             if (turns % 2).any():
                 raise AssertionError("an element between combined functions is not of one phase")
-            summed = np.zeros((len(terms), len(pairs), *values.shape[2:]))
+            summed = np.zeros((len(terms), len(pairs), *part.shape[2:]))
             for sign in (True, False):  # each pair has at most one entry of either sign of K'
                 here = np.flatnonzero((k_row >= 0) == sign)
-                summed[:, slots[here]] += factor[here, None, None] * values[:, here]
+                summed[:, slots[here]] += factor[here, None, None] * part[:, here]
             sign_of_pair = np.empty(len(pairs), dtype=np.int64)
             sign_of_pair[slots] = row_sign
             row_index = self._rows[(sign_of_pair < 0).astype(int), first]

@@ -5,7 +5,7 @@ The torsion-rotation levels r of a species with v_t ≤ vt_max take the place of
     ⟨r' p'|H|r p⟩ = E_r δ + Σ_channels c(p', p) ⟨r'‖X‖r⟩,    ⟨r'‖X‖r⟩ = Σ V*_r',J'K't' ⟨J'K'‖X‖J K⟩⟨K't'|K t⟩ V_r,J K t,
 
 (A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, chapter 7, for c; the overlaps of torsional functions are exact for every K).
-Reduced elements are real where a plane of symmetry contains ρ; without one those of E species are complex. Elements with states of
+Reduced elements of A are real; those of E are real where a mirror plane contains ρ, complex otherwise. Elements with states of
 v_t > vt_max are neglected. They move levels by χ²/ΔE: below 1e-4 MHz for χ of 20 MHz and torsional states 100 cm⁻¹ apart.
 
 Derivatives by coefficients of the torsion-rotation are expectation values: ∂E/∂c = Σ_p ⟨Ψ_p|O_c|Ψ_p⟩, Ψ_p = Σ_r v_rp V_r of each coupling
@@ -28,9 +28,8 @@ from rotor.quantum.internal_rotation.levels import (
     torsion_rotation_levels,
     turning_tops,
 )
-from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION, leaves_plane
+from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION
 from rotor.quantum.internal_rotation.several_tops import SeveralTops
-from rotor.quantum.internal_rotation.terms import Axes
 from rotor.quantum.levels import Levels, SolvedBlock, placed
 from rotor.quantum.spins.blocks import rotor_plan
 from rotor.quantum.spins.levels import solved_blocks, within_n
@@ -59,8 +58,6 @@ def hyperfine_levels(
             "spins of several nuclei beside equivalent tops: their exchange is not computed; leave one of them out"
         )
     terms = valued_terms(top, effects)
-    if model.has_plane:
-        refuse_across_plane(terms, model.frame)
     first = max(2 * nmin - scheme.total, scheme.total % 2)
     all_f = range(first, 2 * nmax + scheme.total + 1, 2)  # neighbouring N are solved too, since spins mix them in
     free = torsion_rotation_levels(top, constants, effects, max(0, nmin - scheme.total), nmax + scheme.total)
@@ -104,15 +101,4 @@ def refuse_unlike_nuclei(scheme: Scheme, terms: Iterable[SpinTerm]) -> None:
         if not isinstance(term.rotor, Cosines | CosinesWithN) or powers or len(set(term.spins)) != 1:
             raise ValueError(
                 f"{term.name} beside internal rotation: only quadrupole and spin-rotation tensors of one nucleus are supported"
-            )
-
-
-def refuse_across_plane(terms: Terms, frame: Axes) -> None:
-    """ValueError for a tensor with a component that the mirror across y excludes."""
-    for _, term in terms:
-        if leaves_plane(term.rotor, frame):
-            plane = "abc".replace(frame.normal, "")
-            raise ValueError(
-                f"{term.name} beside internal rotation: the molecule has the plane {plane} as a mirror, which leaves components along "
-                f"aa, bb, cc and {plane}; leave it out"
             )

@@ -76,7 +76,7 @@ class TorsionMoments(SpeciesMoments):
     def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
         """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
         if rotor not in self._cache:
-            operator = operator_beside_spins(rotor, self.model.frame, self.model.has_plane)
+            operator = operator_beside_spins(rotor, self.model.frame)
             self._cache[rotor] = self._entries(operator, rotor.rank, rotor.rank == 1)
         by_blocks = self._cache[rotor]
 
@@ -103,7 +103,8 @@ class TorsionMoments(SpeciesMoments):
         states: Any = 0.0
         for block, mixture in mixtures:
             vectors = block.vectors @ mixture.reshape(len(mixture), -1)
-            states = states + self.levels.functions.over_products(self.levels.members[block.basis.number], vectors)
+            rows = self.levels.members[block.basis.number]
+            states = states + self.levels.functions.over_products(rows, vectors, self._expectations.needs_phases)
         return np.asarray(self._expectations.of_states(states).reshape(patterns, count, -1).sum(axis=0))
 
     @cached_property
@@ -116,12 +117,6 @@ class TorsionMoments(SpeciesMoments):
         body = tensors[0, 0]
         if body not in self._cache:
             turned = turned_components(np.array(body.components), self.model.frame)
-            if self.model.has_plane and np.iscomplexobj(turned):
-                across = self.model.frame.normal
-                plane = "abc".replace(across, "")
-                pairs = " or ".join("".join(sorted(letter + across)) for letter in plane)
-                what = f"dipole along {across}" if body.rank == 1 else f"tensor along {pairs}"
-                raise ValueError(f"a {what} beside internal rotation: the molecule has the plane {plane} as a mirror")
             self._cache[body] = self._entries(body_tensor(turned), body.rank)
         return self._cache[body]
 

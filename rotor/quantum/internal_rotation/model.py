@@ -65,11 +65,6 @@ class RamModel:
         terms = {name: products_of(name, sigma, self.frame) for name in self.linear_names}
         return terms | torsional_products(sigma)
 
-    @property
-    def tilts(self) -> str:
-        """The axes x and y towards which ρ may turn and change energies to first order; in a plane of symmetry x alone."""
-        return "x" if self.has_plane else "xy"
-
     def slope_by_tilt(self, towards: str, sigma: int) -> list[Product]:
         """∂H/∂angle of a turn of ρ towards x or y, at fixed F and |ρ|, as products, by central differences."""
         products = []
@@ -106,7 +101,7 @@ class RamModel:
 
     @property
     def has_plane(self) -> bool:
-        """Whether every term is real in |J K⟩|K t⟩: a plane of symmetry contains the rho axis."""
+        """Whether H is real in |J K⟩|K t⟩: a plane that contains ρ is one of its symmetries, though perhaps no mirror of the molecule."""
         return bool(self.frame.normal) and all(
             is_real(name, self.frame) for name in self.linear_names if self.values[name]
         )

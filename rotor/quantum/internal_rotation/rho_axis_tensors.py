@@ -40,13 +40,6 @@ def slope_by_tilt(rotor: Rotor, frame: Axes, towards: str) -> Cosines | CosinesW
     return type(rotor)((tuple(first), tuple(second), tuple(third)))
 
 
-def leaves_plane(rotor: Rotor, frame: Axes) -> bool:
-    """Whether the mirror across y changes the sign of some elements of a tensor."""
-    assert isinstance(rotor, Cosines | CosinesWithN)
-    matrix = turned_by(np.array(rotor.components), frame)
-    return bool(matrix[:2, 2].any() or matrix[2, :2].any())
-
-
 def turned_components(components: NDArray[Any], frame: Axes) -> NDArray[Any]:
     """Spherical components along the axes of ρ from those along a, b, c; real if possible."""
     if frame != PRINCIPAL:
@@ -55,12 +48,10 @@ def turned_components(components: NDArray[Any], frame: Axes) -> NDArray[Any]:
     return _real(components)
 
 
-def operator_beside_spins(rotor: Rotor, frame: Axes, has_plane: bool) -> Operator:
-    """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} along the axes of ρ; has_plane: without the components that the mirror across y excludes."""
+def operator_beside_spins(rotor: Rotor, frame: Axes) -> Operator:
+    """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} along the axes of ρ."""
     assert isinstance(rotor, Cosines | CosinesWithN)
     matrix = turned_by(np.array(rotor.components, dtype=float), frame)
-    if has_plane:
-        matrix[:2, 2] = matrix[2, :2] = 0.0
     if isinstance(rotor, Cosines):
         return body_tensor(_real(spherical_components(matrix, 2, REPRESENTATION)))
     vectors = [body_tensor(_real(spherical_components(column, 1, REPRESENTATION))) for column in matrix.T]

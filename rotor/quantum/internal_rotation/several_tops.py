@@ -238,16 +238,13 @@ class SeveralTops:
         ]
 
     def slopes_by_rho(self, species: Species) -> dict[str, list[Product]]:
-        """∂H/∂ρ_ig = Σ_j F_ij (-2 p_j P_g + {ρ_j·P, P_g}), F_ii = F_i, by the names rho_1a, rho_1b, ...
-
-        With a mirror plane ab the slopes along c vanish and are left out.
-        """
+        """∂H/∂ρ_ig = Σ_j F_ij (-2 p_j P_g + {ρ_j·P, P_g}), F_ii = F_i, by the names rho_1a, rho_1b, ..."""
         p, along, slopes = [p_alpha(sigma) for sigma in species], self._along, {}
         f = np.diag([top.f_mhz for top in self.tops])
         for i, j in self._pairs:
             f[i, j] = f[j, i] = self.between.get(f"F{i + 1}{j + 1}", 0.0)
         for i in range(len(self.tops)):
-            for letter, axis in zip("abc", AXES[: 2 if self.has_plane else 3], strict=False):
+            for letter, axis in zip("abc", AXES, strict=True):
                 slopes[f"rho_{i + 1}{letter}"] = [
                     product
                     for j, factor in enumerate(f[i].tolist())

@@ -180,5 +180,7 @@ class SpeciesLevels:
         for number in np.unique(block).tolist():
             here = np.flatnonzero(block == number)
             vectors = self.vectors[number][:, levels[here] - self.starts[number]]
-            slopes[here] = operators.of_states(self.functions.over_products(self.members[number], vectors))
+            slopes[here] = operators.of_states(
+                self.functions.over_products(self.members[number], vectors, operators.needs_phases)
+            )
         return slopes

@@ -21,6 +21,9 @@ CM = rotor.units.MHZ_PER_CM
 CONSTANTS = {"A": 9000.0, "B": 4200.0, "C": 3100.0, "Dab": 700.0, "F": 5.2 * CM, "rho": 0.08, "V3": 40.0 * CM}
 CHI = np.array([[-40.0, 25.0, 0.0], [25.0, 15.0, 0.0], [0.0, 0.0, 25.0]])  # MHz, along a, b, c
 ROTATION = np.diag([30.0, -20.0, 10.0]) * 0.1  # C_gg, MHz
+BODY = {  # components q = -1, 0, 1 of unit vectors with x, y, z = b, c, a
+    "a": [0, 1, 0], "b": [1 / np.sqrt(2), 0, -1 / np.sqrt(2)], "c": [-1j / np.sqrt(2), 0, -1j / np.sqrt(2)],
+}  # fmt: skip
 JMAX, SPIN, WAVES = 2, 1, 3
 
 
@@ -39,8 +42,8 @@ def cosines(states, rank):
     return out
 
 
-def direct_product(sigma, constants, chi):
-    """Energies of all states with J ≤ 2, all M, all M_I."""
+def torsion_rotation(sigma, constants, waves=WAVES):
+    """The functions |J K M⟩ with J ≤ 2, the components of P along a, b, c over them, and H over |J K M⟩|m⟩."""
     states = [(j, k, m) for j in range(JMAX + 1) for k in range(-j, j + 1) for m in range(-j, j + 1)]
     n = len(states)
     raising, along = np.zeros((n, n)), np.diag([float(k) for _, k, _ in states])
@@ -49,7 +52,7 @@ def direct_product(sigma, constants, chi):
             raising[states.index((j, k + 1, m)), c] = np.sqrt(j * (j + 1) - k * (k + 1))
     pa, pb, pc = along.astype(complex), (raising + raising.T) / 2, 0.5j * (raising - raising.T)
 
-    m = 3.0 * np.arange(-WAVES, WAVES + 1) + sigma
+    m = 3.0 * np.arange(-waves, waves + 1) + sigma
     p, one = np.diag(m), np.eye(len(m))
     cos3 = (np.eye(len(m), k=1) + np.eye(len(m), k=-1)) / 2
     c = constants
@@ -57,7 +60,13 @@ def direct_product(sigma, constants, chi):
     rotation = rotation + c.get("Dac", 0.0) * (pa @ pc + pc @ pa) + c.get("Dbc", 0.0) * (pb @ pc + pc @ pb)
     slip = np.kron(np.eye(n), p) - c["rho"] * np.kron(pa, one)
     free = np.kron(rotation, one) + c["F"] * slip @ slip + np.kron(np.eye(n), c["V3"] / 2 * (one - cos3))
+    return states, (pa, pb, pc), free
 
+
+def direct_product(sigma, constants, chi):
+    """Energies of all states with J ≤ 2, all M, all M_I."""
+    states, (pa, pb, pc), free = torsion_rotation(sigma, constants)
+    n, one = len(states), np.eye(2 * WAVES + 1)
     ix, iy, iz = (qutip.jmat(SPIN, axis).full() for axis in "xyz")
     spins = (ix, iy, iz)
     product = [[(a @ b + b @ a) / 2 - (SPIN * (SPIN + 1) / 3 * np.eye(len(ix)) if i == k else 0) for k, b in enumerate(spins)]
@@ -71,11 +80,10 @@ def direct_product(sigma, constants, chi):
         tensor = sum(of_body[q + 2] * turned[space + 2, q + 2] for q in range(-2, 3))
         coupling += (-1) ** space * np.kron(tensor, of_spin[2 - space])
     vector = cosines(states, 1)
-    body = {"a": [0, 1, 0], "b": [1 / np.sqrt(2), 0, -1 / np.sqrt(2)], "c": [-1j / np.sqrt(2), 0, -1j / np.sqrt(2)]}
     spin_vector = [(ix - 1j * iy) / np.sqrt(2), iz, -(ix + 1j * iy) / np.sqrt(2)]
     for letter, component, value in zip("abc", (pa, pb, pc), np.diag(ROTATION), strict=True):
         for space in (-1, 0, 1):
-            cosine = sum(body[letter][q + 1] * vector[space + 1, q + 1] for q in (-1, 0, 1))
+            cosine = sum(BODY[letter][q + 1] * vector[space + 1, q + 1] for q in (-1, 0, 1))
             half = (cosine @ component + component @ cosine) / 2
             coupling += value * (-1) ** space * np.kron(half, spin_vector[1 - space])
     whole = np.kron(free, np.eye(len(ix)))
@@ -95,18 +103,44 @@ def coupled_levels(sigma, constants, chi):
     ]
     names = np.arange(sum(len(block.energies_mhz) for block in free))[:, None] * [1, 0, 0]
     solved = coupled_blocks(free, names, scheme, terms, range(0, 2 * JMAX + 3, 2))
-    assert all(np.iscomplexobj(block.vectors) != ram.has_plane for block in solved)
+    is_real = ram.has_plane and (sigma == 0 or not chi[:2, 2].any())
+    assert all(np.iscomplexobj(block.vectors) != is_real for block in solved)
     return np.sort(np.concatenate([np.repeat(block.energies_mhz, block.twice_total + 1) for block in solved]))
 
 
 @pytest.mark.parametrize("sigma", [0, 1])
-@pytest.mark.parametrize("across", [{}, {"Dac": 300.0, "Dbc": -150.0}])
-def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma, across):
-    """With and without a mirror plane; without it elements between states are complex."""
-    chi = CHI + (np.array([[0, 0, 12], [0, 0, -7], [12, -7, 0]]) if across else 0.0)
+@pytest.mark.parametrize(
+    ("across", "chi_across"),
+    [({}, 0.0), ({"Dac": 300.0, "Dbc": -150.0}, 1.0), ({}, 1.0)],
+    ids=["plane", "none", "axis"],
+)
+def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma, across, chi_across):
+    """With a mirror plane, without it, and without it where the axis of the top lies in a principal plane all the same."""
+    chi = CHI + chi_across * np.array([[0, 0, 12], [0, 0, -7], [12, -7, 0]])
     ours, theirs = coupled_levels(sigma, CONSTANTS | across, chi), direct_product(sigma, CONSTANTS | across, chi)
     assert len(ours) == len(theirs)
     assert np.abs(ours - theirs).max() < 1e-6  # MHz; rounding of energies up to 2e7 MHz is 1e-7
+
+
+@pytest.mark.parametrize("vector", [(1.5, 0.8, 0.6), (0.0, 0.0, 0.6)])
+def test_a_dipole_across_the_plane_of_the_axis_has_the_strengths_of_the_direct_product(vector):
+    """H has the symmetry of the plane that contains ρ; a molecule without this mirror has a dipole across it."""
+    internal = InternalRotationConstants({n: CONSTANTS[n] for n in ("Dab", "F", "rho", "V3")}, "RAM", 1, 20)
+    constants = rotor.Constants(**{n: CONSTANTS[n] for n in "ABC"}, reduction="A", representation="Ir")
+    top = rotor.Top.from_constants(constants, dipole_abc_debye=vector, internal_rotation=internal)
+    lines = rotor.line_list(top, jmax=JMAX, q=1.0, min_lgint=None)
+    for sigma, species in enumerate("AE"):
+        states, _, free = torsion_rotation(sigma, CONSTANTS, waves=10)
+        energies, vectors = np.linalg.eigh(free)
+        along_z = np.einsum("l,lq,qij->ij", vector, [BODY[letter] for letter in "abc"], cosines(states, 1)[1])
+        moved = (along_z @ vectors.reshape(len(states), -1)).reshape(vectors.shape)
+        squares = 3 * np.abs(vectors.conj().T @ moved) ** 2
+        here = lines[(lines.levels.quanta["species"][lines.upper] == species) & (lines.strength_debye2 > 1e-8)]
+        assert len(here) > 40
+        for up, low, strength in zip(here.upper, here.lower, here.strength_debye2, strict=True):
+            rows = [np.abs(energies - here.levels.energy_mhz[level]) < 1e-4 for level in (up, low)]
+            expected = squares[np.ix_(*rows)].sum() * (1 + sigma)
+            assert strength == pytest.approx(expected, rel=1e-5, abs=1e-7)
 
 
 # Levels and lines of a top
