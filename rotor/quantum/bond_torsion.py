@@ -13,8 +13,10 @@ I_r), the coupling with the rotation of the whole, and with other vibrations bey
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,9 +44,16 @@ class FourierSeries:
     """
 
     mean: float
-    n: Ints
-    cosines: Floats
-    sines: Floats
+    n: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    cosines: Floats = field(default_factory=lambda: np.zeros(0))
+    sines: Floats = field(default_factory=lambda: np.zeros(0))
+
+    @classmethod
+    def from_barriers(cls, v: Mapping[int, float], w: Mapping[int, float] = MappingProxyType({})) -> FourierSeries:
+        """Σ ½ V_n (1 - cos nα) + Σ ½ W_n sin nα from V and W by n."""
+        n = sorted({*v, *w})
+        cosines, sines = (np.array([factor * terms.get(i, 0.0) for i in n]) for factor, terms in ((-0.5, v), (0.5, w)))
+        return cls(-float(cosines.sum()), np.array(n, dtype=np.int64), cosines, sines)
 
     @classmethod
     def fitted(
@@ -52,14 +61,14 @@ class FourierSeries:
     ) -> FourierSeries:
         """Least squares of n = period, 2 period, ..., harmonics · period; of cos n(α - α_0) alone where f is even about an angle α_0."""
         alpha, n = np.asarray(angles, dtype=float), period * np.arange(1, harmonics + 1)
-        if even_about is not None:
-            cosines = np.hstack([np.ones((len(alpha), 1)), np.cos(np.outer(alpha - even_about, n))])
-            even = np.linalg.lstsq(cosines, np.asarray(values, dtype=float), rcond=None)[0]
-            return cls(float(even[0]), n, even[1:] * np.cos(n * even_about), even[1:] * np.sin(n * even_about))
-        phases = np.outer(alpha, n)
-        columns = np.hstack([np.ones((len(alpha), 1)), np.cos(phases), np.sin(phases)])
-        fit = np.linalg.lstsq(columns, np.asarray(values, dtype=float), rcond=None)[0]
-        return cls(float(fit[0]), n, fit[1 : harmonics + 1], fit[harmonics + 1 :])
+        about = even_about or 0.0
+        phases = np.outer(alpha - about, n)
+        waves = [np.cos(phases)] if even_about is not None else [np.cos(phases), np.sin(phases)]
+        columns = np.hstack([np.ones((len(alpha), 1)), *waves])
+        mean, *amplitudes = np.linalg.lstsq(columns, np.asarray(values, dtype=float), rcond=None)[0]
+        even, odd = np.append(amplitudes, np.zeros(2 * harmonics - len(amplitudes))).reshape(2, -1)
+        cosine, sine = np.cos(n * about), np.sin(n * about)
+        return cls(float(mean), n, even * cosine - odd * sine, even * sine + odd * cosine)
 
     def values(self, angles: ArrayLike) -> Floats:
         """f at angles in radians."""
@@ -116,8 +125,8 @@ class Well:
 class BondTorsion:
     """F(α) and V(α) of a bond in MHz, and the number of equal periods in a turn, `fold`; V counts from its lowest value, `foot_mhz`.
 
-    >>> free = BondTorsion(FourierSeries(150.0, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
-    >>> free.species_levels(1, 2).round(6).tolist()  # F m² of m = 1, -2
+    >>> free = BondTorsion(FourierSeries(150.0), FourierSeries(0.0), 3)
+    >>> free.states(1, 9)[0][:2].round(6).tolist()  # F m² of m = 1, -2
     [150.0, 600.0]
     """
 
@@ -136,28 +145,24 @@ class BondTorsion:
     @cached_property
     def foot_mhz(self) -> float:
         """The lowest value of the series of V, from which energies count."""
-        return (
-            float(self.potential.values(self.potential.extrema()).min(initial=np.inf))
-            if self._hindered
-            else self.potential.mean
-        )
+        lowest = self.potential.values(self.potential.extrema())
+        return float(lowest.min()) if len(lowest) else self.potential.mean
 
     @cached_property
+    def _maxima(self) -> Floats:
+        """V at its maxima above its foot, 0 without a barrier."""
+        highest = self.potential.values(self.potential.extrema(-1.0)) - self.foot_mhz
+        return highest if len(highest) else np.zeros(1)
+
+    @property
     def barrier_mhz(self) -> float:
         """Highest less lowest value of V."""
-        if not self._hindered:
-            return 0.0
-        return float(self.potential.values(self.potential.extrema(-1.0)).max()) - self.foot_mhz
+        return float(self._maxima.max())
 
     @property
     def lowest_barrier_mhz(self) -> float:
         """The lowest maximum of V above its foot; 0 without a barrier."""
-        tops = self.potential.values(self.potential.extrema(-1.0)) if self._hindered else np.zeros(0)
-        return float(tops.min()) - self.foot_mhz if len(tops) else 0.0
-
-    @property
-    def _hindered(self) -> bool:
-        return bool(np.any(self.potential.cosines) or np.any(self.potential.sines))
+        return float(self._maxima.min())
 
     def sampled(self) -> tuple[Floats, Floats, Floats]:
         """Angles of a whole turn, F and V above its foot there, (SAMPLES,) each."""
@@ -166,8 +171,6 @@ class BondTorsion:
 
     def wells(self) -> list[Well]:
         """The minima of V in a turn by their angle; none without a barrier."""
-        if not self._hindered:
-            return []
         angles = self.potential.extrema()
         v = np.maximum(self.potential.values(angles) - self.foot_mhz, 0.0)
         curvature = np.maximum(self.potential.derivative(angles, 2), 0.0)
@@ -197,19 +200,9 @@ class BondTorsion:
         energies, vectors = np.linalg.eigh(np.outer(m, m) * kinetic + potential)
         return energies, vectors, m
 
-    def species_levels(self, species: int, count: int, waves: int | None = None) -> Floats:
-        """The lowest energies of one species, MHz above the foot."""
-        usual = waves or self.waves_for(4 * float(self.kinetic.values(_grid()).max()) * (count * self.fold) ** 2)
-        return self.states(species, usual)[0][:count]
-
     def all_energies(self, waves: int) -> Floats:
         """Energies of every species in rising order."""
         return np.sort(np.concatenate([self.states(species, waves)[0] for species in range(self.fold)]))
-
-
-def no_terms() -> tuple[Ints, Floats, Floats]:
-    """n, cosines and sines of a constant."""
-    return np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
 
 
 def _grid(count: int = SAMPLES) -> Floats:

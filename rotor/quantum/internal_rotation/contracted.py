@@ -23,7 +23,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.labelled import Basis
 from rotor.quantum.operators.algebra import Operator
-from rotor.quantum.torsion import TorsionalPotential, torsional_states
+from rotor.quantum.torsion import torsional_states
 
 # reduced barrier: between a torsion of 20 cm-1 (1.7) and methyl groups behind a barrier (17 and more)
 NEARLY_FREE = 5.0
@@ -41,17 +41,16 @@ Terms = Mapping[str, Sequence[Product]]  # each name multiplies a sum of product
 
 @dataclass(frozen=True, eq=False)
 class Torsion:
-    """Torsional Hamiltonian that is solved first: F and V in MHz, ρ, and the fold of the top."""
+    """Torsional Hamiltonian that is solved first: F in MHz, ρ, and V_n in MHz by n."""
 
     f_mhz: float
     rho: float
-    potential: TorsionalPotential
-    fold: int = 3
+    barriers: Mapping[int, float]
 
     @property
     def is_near_free(self) -> bool:
         """Whether the reduced barrier s = 4 V3/9F is so low that E levels are named by signed K."""
-        return 4 * abs(self.potential.cosines.get(self.fold, 0.0)) < 9 * NEARLY_FREE * self.f_mhz
+        return 4 * abs(self.barriers.get(3, 0.0)) < 9 * NEARLY_FREE * self.f_mhz
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,18 +102,14 @@ def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, wav
     sigma: 0, or 1 for the E species of a threefold top (-1 has the same energies with K reversed). waves: the free functions are
     exp i(3k + σ)α with k from -waves to waves.
     """
-    k = np.arange(-k_max, k_max + 1)
-    solved = torsional_states(
-        torsion.f_mhz, torsion.potential, shifts=torsion.rho * k, species=sigma, fold=torsion.fold, waves=waves
-    )
-    if count > len(solved.m):
-        raise ValueError(f"n_v = {count}: expected at most {len(solved.m)}, the number of free-rotor functions")
-    energies, vectors = solved.energies.copy(), solved.vectors.copy()
+    waves_k, shifts = np.arange(-waves, waves + 1), torsion.rho * np.arange(-k_max, k_max + 1)
+    if count > len(waves_k):
+        raise ValueError(f"n_v = {count}: expected at most {len(waves_k)}, the number of free-rotor functions")
+    energies, vectors = torsional_states(torsion.f_mhz, torsion.barriers, shifts, sigma, waves)
     parity = np.zeros(energies.shape[1], dtype=np.int64)
     if sigma == 0:
         vectors[:k_max] = vectors[:k_max:-1, ::-1]
         energies[k_max], vectors[k_max], parity = _states_of_parity(energies[k_max], vectors[k_max])
-    waves_k = np.arange(-waves, waves + 1)
     return ContractedTorsion(
         sigma, k_max, waves_k, energies[:, :count], vectors[:, :, :count], parity[:count], torsion.is_near_free
     )

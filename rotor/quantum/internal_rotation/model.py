@@ -16,7 +16,6 @@ from rotor.quantum.internal_rotation.frames import torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
 from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes, is_real, products_of, torsional_products
-from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import BARRIERS
 
 ANGLE_STEP = 1e-3  # radian; terms go with sines and cosines of up to six times the angle, so slopes are good to 1e-5
@@ -27,12 +26,11 @@ DEFAULT_COUNT = 9  # n_v; error 1 Hz for v_t = 0 at J = 25 of methanols and meth
 class RamModel:
     """Constants in the rho-axis frame: MHz by name, rho without a unit. See `terms` for the names.
 
-    values: A, B, C, F, rho and any others. fold: fold of the top. frame: the rho-axis frame along the axes a, b, c of A, B, C and
+    values: A, B, C, F, rho and any others. frame: the rho-axis frame along the axes a, b, c of A, B, C and
     distortion; these axes themselves if the constants belong to the rho-axis frame.
     """
 
     values: Mapping[str, float]
-    fold: int = 3
     frame: Axes = PRINCIPAL
     # σ; E stands for ±1, of equal energies at ∓K
     species: ClassVar[Mapping[str, int]] = MappingProxyType({"A": 0, "E": 1})
@@ -53,7 +51,7 @@ class RamModel:
     def torsion(self) -> Torsion:
         """The torsional part, which is solved first for each K."""
         barriers = {int(name[1:]): value for name, value in self.values.items() if name in BARRIERS}
-        return Torsion(self.values["F"], self.values["rho"], TorsionalPotential(barriers), self.fold)
+        return Torsion(self.values["F"], self.values["rho"], barriers)
 
     @property
     def linear_names(self) -> tuple[str, ...]:

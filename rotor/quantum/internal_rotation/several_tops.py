@@ -28,7 +28,7 @@ from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
 from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes, products_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_x, j_y, j_z
-from rotor.quantum.torsion import TorsionalPotential, cosine, p_alpha, sine
+from rotor.quantum.torsion import cosine, p_alpha, sine
 from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS, PAIRS, sigma_species
 
 AXES = (j_z(), j_x(), j_y())  # P along a, b, c
@@ -49,7 +49,7 @@ class InternalTop:
     @property
     def torsion(self) -> Torsion:
         """The torsional part, which is solved first for each K."""
-        return Torsion(self.f_mhz, self.rho_abc[0], TorsionalPotential({3: self.v3_mhz, 6: self.v6_mhz}))
+        return Torsion(self.f_mhz, self.rho_abc[0], {3: self.v3_mhz, 6: self.v6_mhz})
 
 
 @dataclass(frozen=True, eq=False)

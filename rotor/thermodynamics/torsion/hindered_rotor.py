@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.quantum.bond_torsion import BondTorsion, FourierSeries, no_terms
+from rotor.quantum.bond_torsion import BondTorsion, FourierSeries
 from rotor.table import Table
 from rotor.thermodynamics.functions import GAS_CONSTANT
 
@@ -109,15 +109,15 @@ def hindered_rotor_functions(
 
     Examples
     --------
-    >>> from rotor.quantum.bond_torsion import FourierSeries, no_terms
-    >>> methyl = BondTorsion(FourierSeries(160e3, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
+    >>> from rotor.quantum.bond_torsion import FourierSeries
+    >>> methyl = BondTorsion(FourierSeries(160e3), FourierSeries(0.0), 3)
     >>> functions = hindered_rotor_functions(methyl, [1000.0], 3)
     >>> functions.for_method("levels").cv_over_r.round(6).tolist()  # 1/2 of a free rotor
     [0.5]
     """
     t = np.atleast_1d(np.asarray(temperatures_k, dtype=float))
     kt = t * units.MHZ_PER_K
-    free = BondTorsion(torsion.kinetic, FourierSeries(0.0, *no_terms()), torsion.fold)
+    free = BondTorsion(torsion.kinetic, FourierSeries(0.0), torsion.fold)
     waves = torsion.waves_for(HIGHEST_KT * float(kt.max()))
     parts = {
         "levels": _level_partition(torsion.all_energies(waves), kt),

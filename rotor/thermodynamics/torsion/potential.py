@@ -14,7 +14,6 @@ from rotor.molecules.bond_rotation import BondRotation
 from rotor.molecules.bond_scan import BondScan, relaxed_scan
 from rotor.molecules.bonds import bonded_atoms
 from rotor.quantum.bond_torsion import FourierSeries, potential_of_scan
-from rotor.quantum.torsion import TorsionalPotential
 from rotor.requests.fill import within
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ def is_scan(potential: Any) -> bool:
     """Whether a potential comes from a scan (MMFF94 or a calculator) instead of Fourier terms."""
     if isinstance(potential, str):
         return "=" not in potential and potential != TABLE
-    return not isinstance(potential, TorsionalPotential)
+    return not isinstance(potential, FourierSeries)
 
 
 def potential_and_kinetic(
@@ -43,8 +42,8 @@ def potential_and_kinetic(
 ) -> tuple[FourierSeries, FourierSeries, str, BondScan | None, float]:
     """V and F in MHz, the source of V, the scan, and the misfit (cm⁻¹) of its Fourier series."""
     if not is_scan(stated):
-        terms, source = _named_terms(stated, rotation)
-        return _series(terms), _rigid_kinetic(rotation, points), source, None, 0.0
+        series, source = _named_terms(stated, rotation)
+        return series, _rigid_kinetic(rotation, points), source, None, 0.0
     with within("potential"):
         scan = relaxed_scan(rotation, stated, points=points, progress=progress)
     period = rotation.symmetry_number(isotopes=False)
@@ -61,7 +60,7 @@ def potential_and_kinetic(
     return potential, kinetic, scan.source, scan, float(misfit)
 
 
-def _named_terms(potential: TorsionalPotential | str, rotation: BondRotation) -> tuple[TorsionalPotential, str]:
+def _named_terms(potential: FourierSeries | str, rotation: BondRotation) -> tuple[FourierSeries, str]:
     """The given Fourier terms, or those of the table, and their source."""
     if potential == TABLE:
         return table_barrier(rotation)
@@ -81,15 +80,7 @@ def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:
     )
 
 
-def _series(terms: TorsionalPotential) -> FourierSeries:
-    """Convert Σ ½ V_n (1 - cos nα) + Σ ½ W_n sin nα to a mean, cosines and sines."""
-    n = np.array(sorted({*terms.cosines, *terms.sines}), dtype=np.int64)
-    cosines = np.array([-0.5 * terms.cosines.get(int(i), 0.0) for i in n])
-    sines = np.array([0.5 * terms.sines.get(int(i), 0.0) for i in n])
-    return FourierSeries(-float(cosines.sum()), n, cosines, sines)
-
-
-def parse_potential(text: str, rotation: BondRotation) -> TorsionalPotential:
+def parse_potential(text: str, rotation: BondRotation) -> FourierSeries:
     """Parse a potential such as "V3=400 V6=-10 cm-1": ½ V_n (1 - cos nα), ½ W_n sin nα; cm⁻¹ by default.
 
     Raises ValueError for other texts, repeated terms, and terms that the symmetry of the group excludes.
@@ -109,7 +100,7 @@ def parse_potential(text: str, rotation: BondRotation) -> TorsionalPotential:
                 f"potential: {match[1]}{n}: the bond has {fold} equal positions in a turn; expected n = {fold}, {2 * fold}, ..."
             )
         tables[match[1]][n] = _energy_mhz(match[3], match[4] or unit)
-    return TorsionalPotential(tables["V"], tables["W"])
+    return FourierSeries.from_barriers(tables["V"], tables["W"])
 
 
 def _energy_mhz(number: str, unit: str) -> float:
@@ -122,14 +113,14 @@ def _energy_mhz(number: str, unit: str) -> float:
         raise ValueError(f"potential: {error}, {', '.join(_MOLAR_UNITS)}") from None
 
 
-def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:
+def table_barrier(rotation: BondRotation) -> tuple[FourierSeries, str]:
     """V3 of a similar molecule and its name; ValueError if the bond has no methyl group or the table no similar molecule."""
     barrier = similar_barrier(rotation)
     if barrier is None:
         raise ValueError(
             "potential: the table only has methyl groups, and none like that of this bond; give V_n or a scan (mmff, a calculator)"
         )
-    return TorsionalPotential({3: barrier.v3_cm * units.MHZ_PER_CM}), f"V3, {barrier.text(rotation.molecule)}"
+    return FourierSeries.from_barriers({3: barrier.v3_cm * units.MHZ_PER_CM}), f"V3, {barrier.text(rotation.molecule)}"
 
 
 def similar_barrier(rotation: BondRotation) -> Barrier | None:

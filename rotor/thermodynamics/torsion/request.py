@@ -66,7 +66,7 @@ class TorsionRequest:
     """The rotation about a bond of a molecule; all fields are checked when the request is made.
 
     top: with a geometry. bond: atoms "i-j" or (i, j), from 1; j turns. potential: "V3=400 V6=-10 cm-1", "table", "mmff", the name
-    of an ASE calculator, or (in Python) a TorsionalPotential in MHz or a calculator. points: angles of a scan per turn. vmax: highest
+    of an ASE calculator, or (in Python) a `FourierSeries` in MHz or a calculator. points: angles of a scan per turn. vmax: highest
     torsional level. temperatures_k: of the thermodynamic functions. classical_k: temperature of a classical gas of `molecules`,
     propagated for `duration_ps`; None: no gas.
     """
