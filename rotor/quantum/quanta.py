@@ -104,10 +104,14 @@ def line_text(quanta: Quanta, upper: int, lower: int, halves: Collection[str] = 
     >>> quanta = {"n": np.array([1, 2]), "ka": np.array([0, 0]), "kc": np.array([1, 2]), "f": np.array([2, 3])}
     >>> line_text(quanta, 1, 0)
     '$2_{0,2}$ – $1_{0,1}$, $F = 3 – 2$'
+    >>> line_text({"species": np.array(["E", "E"]), "vt": np.array([0, 0]), **quanta}, 1, 0)
+    '$\\mathrm{E}\\;v_t{=}0\\;2_{0,2}$ – $1_{0,1}$, $F = 3 – 2$'
     """
     rotation = rotational_quanta(quanta)
     sums = [name for name in quanta if name not in rotation]
-    text = " – ".join(state_text(rotation, row, halves) for row in (upper, lower))
+    shared = [name for name in ("species", "vt") if name in rotation and rotation[name][upper] == rotation[name][lower]]
+    named_once = {name: column for name, column in rotation.items() if name not in shared}
+    text = f"{state_text(rotation, upper, halves)} – {state_text(named_once, lower, halves)}"
     if not sums:
         return text
     names = ", ".join(_SUBSCRIPTED.get(name, heading(name)) for name in sums)
@@ -187,7 +191,10 @@ def as_mathtext(text: dict[str, str]) -> str:
     """
     total = text.pop("n", None) or text.pop("j")
     below = [text.pop(name) for name in ("k", "ka", "kc", "irrep") if name in text]
-    before = f"v{{=}}{text.pop('v')}\\;" if "v" in text else ""
+    before = f"\\mathrm{{{text.pop('species')}}}\\;" if "species" in text else ""
+    before += "".join(
+        f"{symbol}{{=}}{text.pop(name)}\\;" for name, symbol in (("vt", "v_t"), ("v", "v")) if name in text
+    )
     after = "".join(f", {_SUBSCRIPTED.get(name, heading(name))}{{=}}{value}" for name, value in text.items())
     subscript = f"_{{{','.join(below)}}}" if below else ""
     return f"${before}{total}{subscript}{after}$" if before or subscript or after else total

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -89,6 +91,29 @@ def test_rows_of_right_constants_have_a_peak_in_the_middle() -> None:
         shares.append(len(middle) / len(axes.get_yticks()))
     assert shares[0] > 0.95
     assert shares[1] < 0.2
+
+
+TURNING = {"F0": 160000.0, "delta": 0.6, "V3": 9e6}
+
+
+def test_series_of_split_lines_have_species_and_sums_of_spins() -> None:
+    """Lines with N in place of J, half-integer F, and A and E of a methyl group: rows of a species stand together."""
+    from rotor.tops.internal_rotation import InternalRotationConstants
+
+    top = rotor.Top.from_constants(
+        {"A": 9200.0, "B": 3000.0, "C": 2310.0, "chi_aa(35Cl)": -60.0, "chi_bb-cc(35Cl)": 3.0},
+        dipole_abc_debye=(1.5, 1.0, 0.0),
+    )
+    top = dataclasses.replace(top, internal_rotation=InternalRotationConstants(TURNING, frame="PAM"))
+    lines = rotor.api.line_list(top, jmax=3, temperature_k=2.0, effects=rotor.api.effects_of(top, True))
+    axes = loomis_wood_figure(lines, lines.intensity_nm2_mhz, spectrum(), "rows").axes[0]
+    names = [text.get_text() for text in axes.get_yticklabels()]
+    assert re.fullmatch(r"\$\\mathrm{A}\\;v_t{=}0\\;\d_{\d,\d}\$ – \$\d_{\d,\d}\$, \$F = \d+/2 – \d+/2\$", names[0]), (
+        names[0]
+    )
+    species = [name[9] for name in names]
+    assert species == sorted(species)
+    assert {*species} == {"A", "E"}
 
 
 def test_command_with_pictures(call: Call, folder: Path) -> None:

@@ -89,17 +89,18 @@ def _named_lines(axes: Any, lines: Lines, heights: Floats, peaks: PeakList) -> l
 
 
 def series_order(lines: Lines, rows: Ints) -> Ints:
-    """Rows ordered by series: equal changes of quantum numbers and equal Ka (or K) together, by rising J."""
+    """Rows ordered by series: equal species, changes of quantum numbers and Ka (or K) together, by rising J (N with spins)."""
     quanta = {
         name: (values[lines.upper[rows]], values[lines.lower[rows]]) for name, values in lines.levels.quanta.items()
     }
-    j = quanta["j"]
+    j = lines.levels.rotational[lines.upper[rows]], lines.levels.rotational[lines.lower[rows]]
     keys: list[Any] = [j[0]]
     for name in ("kc", "ka", "k"):
         if name in quanta:
             upper, lower = quanta[name]
             keys += [j[1] - lower - quanta["ka"][1], upper - lower] if name == "kc" else [lower, upper - lower]
-    return np.asarray(rows[np.lexsort([*keys, j[0] - j[1]])], dtype=np.int64)
+    states = [quanta[name][0] for name in ("vt", "species") if name in quanta]
+    return np.asarray(rows[np.lexsort([*keys, j[0] - j[1], *states])], dtype=np.int64)
 
 
 def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
@@ -107,6 +108,7 @@ def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: st
 
     With correct constants the peaks of a species align at 0; with wrong constants they drift from row to row.
     """
+    levels = lines.levels
     with styled():
         rows = np.argsort(-heights, kind="stable")[:MOST_ROWS]
         rows = series_order(lines, rows[heights[rows] > 0])
@@ -121,7 +123,7 @@ def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: st
         axes.axvline(0, color="black", lw=0.4)
         axes.set_yticks(
             range(len(rows)),
-            [line_text(lines.levels.quanta, lines.upper[row], lines.lower[row]) for row in rows.tolist()],
+            [line_text(levels.quanta, lines.upper[row], lines.lower[row], levels.halves) for row in rows.tolist()],
             fontsize=8,
         )
         axes.set_ylim(len(rows) - 0.3, -0.7)
