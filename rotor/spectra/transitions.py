@@ -260,8 +260,15 @@ def _many_f_transitions(
     from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, tensor_moments
 
     tensors = {states: body_tensor(mu, 1, str(levels.representation)) for states, mu in dipoles.items()}
-    groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].spins.shared, tensors), len(levels))
     energies, needed = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
+    first, last = range_mhz
+
+    def in_range(up: Indices, low: Indices) -> NDArray[np.bool_]:
+        frequency = np.abs(energies[up][:, :, None] - energies[low][:, None, :])
+        return (frequency >= first) & (frequency <= last)
+
+    near = None if range_mhz == EVERYTHING else in_range
+    groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].spins.shared, tensors), len(levels), near=near)
     space = Workspace()
     return _joined((_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups), cut)
 

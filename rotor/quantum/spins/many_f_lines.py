@@ -57,6 +57,10 @@ Operator = Callable[[slice, NDArray[Any], NDArray[Any]], NDArray[Any]]
 """Elements V' X V (blocks, n', n) of a run of its blocks between vectors (blocks, columns, states, n)."""
 
 
+Near = Callable[[Indices, Indices], NDArray[np.bool_]]
+"""Whether lines between rows (blocks, n') and (blocks, n) are needed, as (blocks, n', n)."""
+
+
 ActingMoment = tuple[Tables, ChainOperator]
 """Elements of the rotation, and what acts on the spins."""
 
@@ -179,11 +183,12 @@ def with_dipoles(
 
 
 def amplitudes_of_groups(
-    blocks: Sequence[SolvedBlock], moments: Moments, levels: int, both_orders: bool = False
+    blocks: Sequence[SolvedBlock], moments: Moments, levels: int, both_orders: bool = False, near: Near | None = None
 ) -> Iterator[Rows]:
     """Reduced elements between all blocks, many at a time, each pair of blocks once; `levels` is the row of padding.
 
     Amplitudes are zero beyond a block, complex where those of the rotation are. both_orders: pairs of blocks of one F occur in both orders.
+    near: elements of states without a line that is needed are left out.
     """
     shared = blocks[0].spins.shared
     frame = shared.frame
@@ -193,7 +198,7 @@ def amplitudes_of_groups(
     for rise, rise_of_k, (place, low) in product(range(0, 2 * moments.rank + 1, 2), rises_of_k, enumerate(groups)):
         if rise or both_orders or rise_of_k >= 0:
             for up in groups if rise or both_orders or rise_of_k else groups[place:]:
-                yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared, spaces)
+                yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared, spaces, near)
 
 
 def connections_of(blocks: Sequence[SolvedBlock], moments: Moments) -> Connections:
@@ -252,7 +257,7 @@ def _states_of_group(blocks: list[SolvedBlock], levels: int) -> GroupStates:
 
 def _between(
     up: GroupStates, low: GroupStates, rise: int, step: int, moments: Moments, shared: Shared,
-    spaces: Sequence[Workspace],
+    spaces: Sequence[Workspace], near: Near | None,
 ) -> Iterator[Rows]:  # fmt: skip
     """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`; spaces: for each sum of moments."""
     frame = shared.frame
@@ -281,10 +286,25 @@ def _between(
         ]
         for run in runs_of_similar_size(low.sizes[right].tolist(), _LIKE, _SMALL, _MOST):
             bra, ket = up.vectors(left[run]), low.vectors(right[run])
-            each = [operator(run, bra, ket) for operator in operators]
-            amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
             up_rows, low_rows = up.rows[left[run], : bra.shape[3]], low.rows[right[run], : ket.shape[3]]
+            if near is not None:
+                needed = near(up_rows, low_rows)
+                bra, up_rows = _states_with_lines(bra, up_rows, needed.any(axis=2))
+                ket, low_rows = _states_with_lines(ket, low_rows, needed.any(axis=1))
+            each = [operator(run, bra, ket) for operator in operators] if up_rows.size and low_rows.size else []
+            if not each:
+                continue
+            amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
             yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
+
+
+def _states_with_lines(vectors: NDArray[Any], rows: Indices, needed: NDArray[np.bool_]) -> tuple[NDArray[Any], Indices]:
+    """Vectors (blocks, columns, states, n) and rows (blocks, n) of the needed states, and of others up to the largest number of a block."""
+    most = int(needed.sum(axis=1).max())
+    if 2 * most > needed.shape[1]:  # a copy would not be worth it
+        return vectors, rows
+    chosen = np.sort(np.argsort(~needed, axis=1, kind="stable")[:, :most], axis=1)
+    return np.take_along_axis(vectors, chosen[:, None, None], axis=3), np.take_along_axis(rows, chosen, axis=1)
 
 
 def _coefficients(scheme: Scheme, frame: Frame, moment: ChainOperator, rise: int) -> Coefficients:

@@ -93,6 +93,32 @@ def test_lines_above_a_cut_are_among_all_lines(case, range_mhz, monkeypatch):
     assert np.abs(together.strength_debye2[first] - listed.strength_debye2[kept][second]).max() < 1e-12
 
 
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("range_mhz", [(2.0e4, 2.02e4), (0.0, 30.0), (1.0, 1.01)])
+def test_a_narrow_range_has_the_lines_of_the_whole_list_from_few_states(case, range_mhz, monkeypatch):
+    text, more = CASES[case]
+    spins = SpinConstants.parse(text, "S=1/2 1H=1/2") if "(S" in text else SpinConstants.parse(text)
+    top = Top.from_constants(CONSTANTS, dipole_abc_debye=DIPOLE, spin_constants=spins)
+    settings = {"jmax": 10, "q": 1e3, "min_lgint": -14.0, "effects": (*effects_of(top, True), *more)}
+    widths, states_with_lines = [], many_f_lines._states_with_lines
+
+    def counted(vectors, rows, needed):
+        chosen = states_with_lines(vectors, rows, needed)
+        widths.append((chosen[0].shape[3], vectors.shape[3]))
+        return chosen
+
+    monkeypatch.setattr(many_f_lines, "_states_with_lines", counted)
+    narrow, whole = line_list(top, range_mhz=range_mhz, **settings), line_list(top, **settings)
+    expected = whole[(whole.frequency_mhz >= range_mhz[0]) & (whole.frequency_mhz <= range_mhz[1])]
+    assert len(expected) > 0 or range_mhz[1] < 2
+    for column in ("upper", "lower", "frequency_mhz"):
+        assert np.array_equal(getattr(narrow, column), getattr(expected, column))
+    assert np.allclose(narrow.strength_debye2, expected.strength_debye2, rtol=1e-9, atol=1e-18)
+    if range_mhz[0] > 1e4:
+        few, all_states = np.sum(widths, axis=0)
+        assert few < all_states / 2
+
+
 def test_levels_without_a_weight_make_no_lines():
     """Rows of weight 0 within a block, as with a spin that spin weights take into account."""
     levels = _levels("one nucleus")
