@@ -24,7 +24,7 @@ import numpy as np
 
 from rotor.scenes.run import run_scene, scene_calculation
 from rotor.scenes.scene import parse_scene
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results" / "asked_and_stated.json"

@@ -32,7 +32,7 @@ from isotopologue_cases import isotopologue_cases
 
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.assign import answer_assign
-from rotor.assignment.peaks import PeakList, peak_list
+from rotor.assignment.peaks.peak_list import PeakList, peak_list
 from rotor.assignment.request import AssignRequest
 
 LEAST_SNR = 100.0

@@ -22,11 +22,11 @@ from rotor.fitting.assignment import Assignments, assignments, levels_in
 from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import Parameters, parameters
 from rotor.fitting.result import Fit
-from rotor.fitting.search import Search
+from rotor.fitting.search.residuals import Search
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.quantum.solve import solve_levels
 from rotor.statistics.least_squares import _Linear, _State
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 TRUE = Constants(

@@ -187,7 +187,7 @@ def iteration(folder: Path) -> float:
     from bench_fit import fastest
 
     from rotor.fitting.assignment import levels_in
-    from rotor.fitting.search import Search
+    from rotor.fitting.search.residuals import Search
     from rotor.formats.spcat.fits.fit_input import read_fit
     from rotor.quantum.labelled import level_model
     from rotor.statistics.least_squares import _Linear, _State

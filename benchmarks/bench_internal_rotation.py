@@ -21,7 +21,7 @@ import rotor
 from rotor.fitting.assignment import assignments
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
-from rotor.fitting.search import FitOptions
+from rotor.fitting.search.residuals import FitOptions
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.internal_rotation.belgi import read_belgi_levels
 from rotor.quantum.internal_rotation.labels import counted_ka_kc
@@ -147,7 +147,7 @@ def iteration_of_a_fit() -> Callable[[], object]:
     start = TopConstants(top)
     start = start.replace(**{name: 0.0 for name in free if name not in start})
     from rotor.fitting.assignment import levels_in
-    from rotor.fitting.top_levels import label_model
+    from rotor.fitting.levels.top_levels import label_model
 
     levels = label_model(start, levels_in(lines)[0])
     values = np.array(list(start.values.values()))

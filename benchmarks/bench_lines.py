@@ -34,8 +34,8 @@ RESULTS = Path(__file__).parent / "results" / "lines.json"
 def measure(jmax: int, work: str) -> dict[str, float]:
     """One figure, in this process: seconds of the best of five runs, and how many lines."""
     import rotor
-    from rotor.spectra import transitions
     from rotor.spectra.lines import line_list
+    from rotor.spectra.transitions import pairs as transitions
     from rotor.tops.top import Top
 
     top = Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.201, 1.916, 0.365))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from broadband_cases import LOWEST, Species, case_with, lines_of, quartic
 
-from rotor.assignment.peaks import PeakList, peak_list
+from rotor.assignment.peaks.peak_list import PeakList, peak_list
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.readers.smiles import from_smiles
 from rotor.tops.isotopes.isotopologues import isotopologues

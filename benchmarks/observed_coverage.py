@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from rotor.observed.fit import contributions, fit_source
-from rotor.observed.model import Component, model
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import SpeciesLines, species_lines
+from rotor.observed.model.model import Component, model
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import SpeciesLines, species_lines
 from rotor.observed.spectrum import observed_spectrum
 from rotor.observed.start import start_components
 

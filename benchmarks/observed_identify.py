@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 from observed_coverage import records, scaled, wilson
 
-from rotor.observed.identify import identify
-from rotor.observed.model import Component, model
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import SpeciesLines, species_lines
+from rotor.observed.identification.identify import identify
+from rotor.observed.model.model import Component, model
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import SpeciesLines, species_lines
 from rotor.observed.spectrum import observed_spectrum
 
 FIRST, LAST, CHANNEL, NOISE = 230e3, 231e3, 0.25, 0.05  # MHz, K

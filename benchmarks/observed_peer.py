@@ -18,8 +18,8 @@ import numpy as np
 
 from rotor import units
 from rotor.formats.read_write import read
-from rotor.observed.model import KM_PER_S, Component, Sight, model
-from rotor.observed.species import SpeciesLines, species_from_lines
+from rotor.observed.model.model import KM_PER_S, Component, Sight, model
+from rotor.observed.model.species import SpeciesLines, species_from_lines
 from rotor.spectra.lines import line_list
 
 WIDTH_KM_S, BACKGROUND_K, CHANNEL = 3.0, 2.725, 0.1

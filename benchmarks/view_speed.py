@@ -29,7 +29,7 @@ from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.molecules.molecule_writer import write_molecule_file
 from rotor.observed.spectrum import observed_spectrum
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 from rotor.viewer.opening import open_session
 from rotor.viewer.records import SpectrumFile

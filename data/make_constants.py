@@ -28,7 +28,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.formats.lines.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.spcat.text.cat import read_cat
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.units import MHZ_PER_CM
 
 MOLECULES = Path(__file__).with_name("molecules")

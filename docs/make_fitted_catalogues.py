@@ -15,13 +15,13 @@ import numpy as np
 
 import rotor
 from rotor.fitting.assignment import Assignments
-from rotor.fitting.choose import Trial, choose_constants
-from rotor.fitting.criteria import aicc
+from rotor.fitting.choice.choose import Trial, choose_constants
+from rotor.fitting.choice.criteria import aicc
 from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import with_names
 from rotor.fitting.result import Fit
 from rotor.formats.lines.assigned_lines import QUANTA, read_assigned_lines
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 
 PAGE = Path(__file__).with_name("validation") / "fitted_catalogues.md"
 

@@ -16,7 +16,7 @@ from rotor import cli
 from rotor.requests.field import PANELS, panel_of
 from rotor.requests.readers import Field
 from rotor.verbs import declared_verbs
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 EVERYWHERE = {"--json", "--save-scene", "--errors", "--sources", "--help", "--help-all"}
 PAGE = Path(__file__).parent / "options.md"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.fitting.choose import choose_constants
+from rotor.fitting.choice.choose import choose_constants
 from rotor.fitting.fit import FitOptions
 from rotor.fitting.result import Fit
 from rotor.formats.fits.family_file import read_family
@@ -26,7 +26,7 @@ from rotor.structures.family import Family, family
 from rotor.structures.kraitchman import Substituted, kraitchman
 from rotor.structures.least_squares import FittedStructure, fit_structure
 from rotor.structures.substitution import substitution_structure
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rotor.scenes.sweep import run_sweep as run_sweep
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.spectrum import Spectrum as Spectrum
-    from rotor.tops.constants import Constants as Constants
+    from rotor.tops.constants.constants import Constants as Constants
     from rotor.tops.spins.spin_constants import SpinConstants as SpinConstants
     from rotor.tops.states.state_constants import StateConstants as StateConstants
     from rotor.tops.top import Top as Top
@@ -61,7 +61,7 @@ VERBS = (
 _MODULES = {
     "ErrorBudget": "rotor.requests.budget",
     "Result": "rotor.calls",
-    "Constants": "rotor.tops.constants",
+    "Constants": "rotor.tops.constants.constants",
     "FreeMotion": "rotor.classical.free.free_motion",
     "Levels": "rotor.quantum.levels",
     "Lines": "rotor.spectra.lines",

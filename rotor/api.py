@@ -32,8 +32,8 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.alignment.request import AlignRequest as AlignRequest
     from rotor.alignment.request import answer_align as answer_align
     from rotor.assignment.assign import answer_assign as answer_assign
-    from rotor.assignment.intensities import fit_intensities as fit_intensities
-    from rotor.assignment.peak_finding import pick_peaks as pick_peaks
+    from rotor.assignment.peaks.intensities import fit_intensities as fit_intensities
+    from rotor.assignment.peaks.peak_finding import pick_peaks as pick_peaks
     from rotor.assignment.request import AssignRequest as AssignRequest
     from rotor.classical.effect import Torque as Torque
     from rotor.classical.effects.changing_inertia import ChangingInertia as ChangingInertia
@@ -81,14 +81,14 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.classical.tumble import TumbleRequest as TumbleRequest
     from rotor.classical.tumble import answer_tumble as answer_tumble
     from rotor.fitting.assignment import assignments as assignments
-    from rotor.fitting.choose import choose_constants as choose_constants
-    from rotor.fitting.choose import suggest_lines as suggest_lines
+    from rotor.fitting.choice.choose import choose_constants as choose_constants
+    from rotor.fitting.choice.choose import suggest_lines as suggest_lines
     from rotor.fitting.fit import fit_lines as fit_lines
     from rotor.fitting.parameters import parameters as parameters
-    from rotor.fitting.publication import publication_table as publication_table
-    from rotor.fitting.report import report_text as report_text
+    from rotor.fitting.reports.publication import publication_table as publication_table
+    from rotor.fitting.reports.report import report_text as report_text
     from rotor.fitting.resampling import bootstrap as bootstrap
-    from rotor.fitting.search import FitOptions as FitOptions
+    from rotor.fitting.search.residuals import FitOptions as FitOptions
     from rotor.fitting.top_constants import TopConstants as TopConstants
     from rotor.fluids.forces.potential import RigidPotential as RigidPotential
     from rotor.fluids.motion.dynamics import RigidDynamics as RigidDynamics
@@ -145,14 +145,14 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.observed.fit import FitChoices as FitChoices
     from rotor.observed.fit import contributions as contributions
     from rotor.observed.fit import fit_source as fit_source
-    from rotor.observed.identify import identify as identify
-    from rotor.observed.model import Component as Component
-    from rotor.observed.model import Sight as Sight
-    from rotor.observed.model import model as model
-    from rotor.observed.partition import PartitionTable as PartitionTable
-    from rotor.observed.selection import IdentifyChoices as IdentifyChoices
-    from rotor.observed.species import species_lines as species_lines
-    from rotor.observed.species import strength_from_einstein as strength_from_einstein
+    from rotor.observed.identification.identify import identify as identify
+    from rotor.observed.identification.selection import IdentifyChoices as IdentifyChoices
+    from rotor.observed.model.model import Component as Component
+    from rotor.observed.model.model import Sight as Sight
+    from rotor.observed.model.model import model as model
+    from rotor.observed.model.partition import PartitionTable as PartitionTable
+    from rotor.observed.model.species import species_lines as species_lines
+    from rotor.observed.model.species import strength_from_einstein as strength_from_einstein
     from rotor.observed.spectrum import observed_spectrum as observed_spectrum
     from rotor.observed.start import start_components as start_components
     from rotor.plots.energies.heat_capacity import Panel as Panel
@@ -200,15 +200,15 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.spectra.classical_band import dipole_band_area as dipole_band_area
     from rotor.spectra.classical_band import lines_area as lines_area
     from rotor.spectra.classical_band import rigid as rigid
-    from rotor.spectra.emission_request import EmissionRequest as EmissionRequest
-    from rotor.spectra.emission_request import answer_emission as answer_emission
+    from rotor.spectra.emission.request import EmissionRequest as EmissionRequest
+    from rotor.spectra.emission.request import answer_emission as answer_emission
     from rotor.spectra.fields.lines import field_lines as field_lines
     from rotor.spectra.fields.stark_coefficients import line_coefficients as line_coefficients
     from rotor.spectra.lines import line_list as line_list
-    from rotor.spectra.raman import RamanLines as RamanLines
-    from rotor.spectra.raman import raman_lines as raman_lines
-    from rotor.spectra.raman_request import RamanRequest as RamanRequest
-    from rotor.spectra.raman_request import answer_raman as answer_raman
+    from rotor.spectra.raman.raman import RamanLines as RamanLines
+    from rotor.spectra.raman.raman import raman_lines as raman_lines
+    from rotor.spectra.raman.request import RamanRequest as RamanRequest
+    from rotor.spectra.raman.request import answer_raman as answer_raman
     from rotor.spectra.request import GasLayer as GasLayer
     from rotor.spectra.request import SpectrumRequest as SpectrumRequest
     from rotor.spectra.request import answer_spectrum as answer_spectrum

@@ -18,8 +18,8 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import REQUIRED
 from rotor.requests.fill import Entries
 from rotor.requests.readers import Field
-from rotor.verbs.calculation import Calculation, Outcome
-from rotor.verbs.verb import Verb, Work, verb_of
+from rotor.verbs.common.calculation import Calculation, Outcome
+from rotor.verbs.common.verb import Verb, Work, verb_of
 
 EXAMPLES = {
     "spectrum": (

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotor.alignment.propagation.timeline import Channel, Window
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, GaussianPulse, Kick, Pulse
-from rotor.alignment.timeline import Channel, Window
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import Contraction
 

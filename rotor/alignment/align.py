@@ -20,14 +20,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.alignment import observables as observe
-from rotor.alignment import propagate
 from rotor.alignment.acting import guessed_jmax, window_contractions
-from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, Task, block_tasks, run
 from rotor.alignment.ensemble import Ensemble, ground_level, single_level, thermal
 from rotor.alignment.observables import Harmonics
+from rotor.alignment.propagation import propagate
+from rotor.alignment.propagation.carry import EDGE, Outcome, Plan, Problem, Task, block_tasks, run
+from rotor.alignment.propagation.steps import Pilot, lowest_jmax, run_pilot
+from rotor.alignment.propagation.timeline import timeline
 from rotor.alignment.pulse import DEFAULT_TOLERANCE, RAD_PER_PS_MHZ, Pulse
-from rotor.alignment.steps import Pilot, lowest_jmax, run_pilot
-from rotor.alignment.timeline import timeline
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import FieldSpace, FreeLevels
 from rotor.table import Table

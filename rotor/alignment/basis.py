@@ -14,10 +14,10 @@ import numpy as np
 
 from rotor.alignment import observables as observe
 from rotor.alignment.acting import window_contractions
-from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, run
+from rotor.alignment.propagation.carry import EDGE, Outcome, Plan, Problem, run
+from rotor.alignment.propagation.steps import PILOT_TIMES, pilot_task, relative_edge, run_pilot
+from rotor.alignment.propagation.timeline import timeline
 from rotor.alignment.pulse import RAD_PER_PS_MHZ
-from rotor.alignment.steps import PILOT_TIMES, pilot_task, relative_edge, run_pilot
-from rotor.alignment.timeline import timeline
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.alignment.acting import acted_on, spread
 from rotor.alignment.observables import figure_axis
+from rotor.alignment.propagation.timeline import Channel, Window, timeline
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
-from rotor.alignment.timeline import Channel, Window, timeline
 from rotor.arrays import Floats, Ints
 from rotor.classical.effect import Torque
 from rotor.classical.effects.dipole_in_field import PulsedDipole, PulsedPolarizability

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 
 from rotor.alignment.acting import acted_on, guessed_jmax
 from rotor.alignment.observables import observable
+from rotor.alignment.propagation.timeline import Channel, Window, timeline
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
-from rotor.alignment.timeline import Channel, Window, timeline
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import cosine_bands
 from rotor.quantum.fields.blocks import Contraction

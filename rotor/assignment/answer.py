@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment.evidence import NOT_FOUND, word
-from rotor.assignment.grown import LEAST_RATIO, Grown
-from rotor.assignment.progressions import Progression, progressions
+from rotor.assignment.peaks.progressions import Progression, progressions
 from rotor.assignment.request import AssignRequest
-from rotor.assignment.rigid_table import PARAMETERS, TYPES
+from rotor.assignment.search.rigid_table import PARAMETERS, TYPES
+from rotor.assignment.species.evidence import NOT_FOUND, word
+from rotor.assignment.species.grown import LEAST_RATIO, Grown
 from rotor.fitting.assignment import Assignments
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.table import Table, TextOf
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 if TYPE_CHECKING:  # the search and its compiled loops are loaded by a search only
-    from rotor.assignment.refinement import Refined
+    from rotor.assignment.species.refinement import Refined
 
 
 @dataclass(frozen=True, eq=False)

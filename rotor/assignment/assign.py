@@ -11,10 +11,15 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
-from rotor.assignment.bounds import Bounds
-from rotor.assignment.confirmation import confirmed
-from rotor.assignment.doublets import with_centres
-from rotor.assignment.evidence import (
+from rotor.assignment.peaks.doublets import with_centres
+from rotor.assignment.peaks.peak_list import PeakList, spurs
+from rotor.assignment.request import AssignRequest
+from rotor.assignment.search.bounds import Bounds
+from rotor.assignment.search.families import MOST, SAMPLES, Family, families
+from rotor.assignment.search.rigid_table import JMAX, rigid_table
+from rotor.assignment.search.roots import CHANCE_OF_FEW, Field
+from rotor.assignment.species.confirmation import confirmed
+from rotor.assignment.species.evidence import (
     FEWEST,
     NOT_FOUND,
     UNDETERMINED,
@@ -23,16 +28,11 @@ from rotor.assignment.evidence import (
     probability,
     word,
 )
-from rotor.assignment.families import MOST, SAMPLES, Family, families
-from rotor.assignment.grown import Grown
-from rotor.assignment.growth import grown_anew
-from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologues
-from rotor.assignment.peaks import PeakList, spurs
-from rotor.assignment.refinement import excess_scatter, refine
-from rotor.assignment.request import AssignRequest
-from rotor.assignment.rigid_table import JMAX, rigid_table
-from rotor.assignment.search import CHANCE_OF_FEW, Field
-from rotor.assignment.species import (
+from rotor.assignment.species.grown import Grown
+from rotor.assignment.species.growth import grown_anew
+from rotor.assignment.species.isotopologues import expected_isotopologues, find_isotopologues
+from rotor.assignment.species.refinement import excess_scatter, refine
+from rotor.assignment.species.successive import (
     FIRST_STAGES,
     GUESS_STAGES,
     NEXT_STAGES,

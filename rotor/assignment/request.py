@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.assignment.bounds import Bounds
 from rotor.assignment.guesses import guess_values
-from rotor.assignment.peaks import PeakList
+from rotor.assignment.peaks.peak_list import PeakList
+from rotor.assignment.search.bounds import Bounds
 from rotor.requests.field import check_fields, declared
 from rotor.requests.lists import Numbers
 from rotor.requests.readers import Custom, Flag, Quantity, Whole
 
 if TYPE_CHECKING:
-    from rotor.assignment.grown import Grown
+    from rotor.assignment.species.grown import Grown
     from rotor.molecules.molecule import Molecule
 
 LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # default bounds of A, B, C

@@ -26,7 +26,7 @@ from rotor.cli.process import release_files
 from rotor.verbs import declared_verbs, has_small_blocks
 
 if TYPE_CHECKING:
-    from rotor.verbs.verb import Verb
+    from rotor.verbs.common.verb import Verb
 
 VERBS = {  # with their lines in the list of verbs, short enough for 80 columns
     "spectrum": "Rotational lines: frequencies and intensities.",

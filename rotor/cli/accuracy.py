@@ -12,8 +12,8 @@ from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, listed, record_table, show_parts
 from rotor.requests.field import declared
 from rotor.requests.readers import Quantity
-from rotor.verbs.outputs import PICTURES, Output, Report
-from rotor.verbs.verb import Tool, Work
+from rotor.verbs.common.outputs import PICTURES, Output, Report
+from rotor.verbs.common.verb import Tool, Work
 
 if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import WorkPrecision

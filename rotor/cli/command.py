@@ -27,10 +27,10 @@ from rotor.reports.screen import show_parts
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, panel_of
 from rotor.requests.fill import Entries, naming, within
 from rotor.requests.readers import Field, Flag, Text, Whole
-from rotor.verbs.calculation import Calculation, Outcome, answering
-from rotor.verbs.molecule import is_file
-from rotor.verbs.outputs import Files, Report, write_text
-from rotor.verbs.verb import Verb, Work
+from rotor.verbs.common.calculation import Calculation, Outcome, answering
+from rotor.verbs.common.molecule import is_file
+from rotor.verbs.common.outputs import Files, Report, write_text
+from rotor.verbs.common.verb import Verb, Work
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
 FILE, COUNT = Text(metavar="FILE"), Text(metavar="N")

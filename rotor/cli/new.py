@@ -9,8 +9,8 @@ from rotor.frozen import dataclass
 from rotor.requests.field import declared
 from rotor.requests.readers import Flag, Text
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.outputs import Output, write_text
-from rotor.verbs.verb import Tool
+from rotor.verbs.common.outputs import Output, write_text
+from rotor.verbs.common.verb import Tool
 
 EXAMPLES = """\
   rotor new spectrum > s.toml

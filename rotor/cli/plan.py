@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared_options import SceneAnswer, SceneFile
 from rotor.reports.screen import Part, listed
-from rotor.verbs.verb import Tool, verb_of
+from rotor.verbs.common.verb import Tool, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan

@@ -21,8 +21,8 @@ from rotor.requests.field import NUMERICS, OUTPUT, declared
 from rotor.requests.fill import within
 from rotor.requests.readers import Flag, Rule, Text, Whole
 from rotor.table import counted
-from rotor.verbs.outputs import Report
-from rotor.verbs.verb import ErrorsShown, Tool, Work
+from rotor.verbs.common.outputs import Report
+from rotor.verbs.common.verb import ErrorsShown, Tool, Work
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rotor.scenes.scene import Scene
     from rotor.scenes.sweep import SweepResult
     from rotor.table import Table as Columns
-    from rotor.verbs.calculation import Outcome
+    from rotor.verbs.common.calculation import Outcome
 
 SHOWN = 20  # rows of the table, and reasons of failed points, in the report
 SHOWN_OF_REASON = 3  # points listed for one reason

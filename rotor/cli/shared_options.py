@@ -15,7 +15,7 @@ from rotor.requests.readers import Custom, Field, Range, Reader, Text
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import Scene
-    from rotor.verbs.verb import Verb
+    from rotor.verbs.common.verb import Verb
 
 MOST_WORKERS = 256
 UNITS = ("MHz", "GHz", "THz", "cm-1")

@@ -11,9 +11,9 @@ from rotor.checks import leaving
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
-from rotor.verbs.observed_file import PANEL
-from rotor.verbs.outputs import Output, Report
-from rotor.verbs.verb import Tool, Work
+from rotor.verbs.common.outputs import Output, Report
+from rotor.verbs.common.verb import Tool, Work
+from rotor.verbs.measurements.observed_file import PANEL
 
 if TYPE_CHECKING:
     from rotor.viewer.service import Service

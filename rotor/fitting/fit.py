@@ -3,7 +3,7 @@
     χ² = Σ ((ν_obs - ν_calc)/σ)² + Σ ((p - p₀)/σ_prior)²,      ν_calc = E(upper) - E(lower), in a blend the weighted mean
 
 A `LevelModel` gives the energies of the labelled levels, and their derivatives, for any constants. The search itself is in
-`rotor.fitting.search` and `rotor.fitting.strategies`. A fit has converged if the search is at a minimum and the minimum
+`rotor.fitting.search.residuals` and `rotor.fitting.search.strategies`. A fit has converged if the search is at a minimum and the minimum
 describes the lines; a weighted rms far above 1 is reported as a failure.
 """
 
@@ -17,14 +17,14 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, levels_in
-from rotor.fitting.fit_notes import fit_notes, start_notes
+from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.parameters import Parameters
+from rotor.fitting.reports.fit_notes import fit_notes, start_notes
 from rotor.fitting.result import Fit
-from rotor.fitting.search import FitOptions as FitOptions
-from rotor.fitting.search import Search, line_errors, round_off, too_few
-from rotor.fitting.strategies import with_rejection
+from rotor.fitting.search.residuals import FitOptions as FitOptions
+from rotor.fitting.search.residuals import Search, line_errors, round_off, too_few
+from rotor.fitting.search.strategies import with_rejection
 from rotor.fitting.top_constants import ConstantSet
-from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.requests.budget import ROUNDING
 from rotor.statistics.least_squares import EXHAUSTED, Minimum, Progress
@@ -76,7 +76,7 @@ def fit_lines(
 
     >>> from rotor.fitting.assignment import assignments
     >>> from rotor.fitting.parameters import parameters as free
-    >>> from rotor.tops.constants import Constants
+    >>> from rotor.tops.constants.constants import Constants
     >>> start = Constants(B=57000.0, D=0.1)
     >>> seen = assignments(("j",), [[1], [2], [3]], [[0], [1], [2]], [115271.2018, 230538.0, 345795.9899], 0.0005)
     >>> fit = fit_lines(seen, start, free(start, ["B", "D"]))

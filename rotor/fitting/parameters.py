@@ -15,8 +15,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import DIPOLES, ConstantSet
-from rotor.tops.constants import UnknownConstantError
-from rotor.tops.kind_of_constants import RIGID
+from rotor.tops.constants.constants import UnknownConstantError
+from rotor.tops.constants.kind_of_constants import RIGID
 from rotor.units import parse_quantity
 
 _NAME = r"(\w+(?:-[abc]{2}(?:_\w+)?(?=\())?(?:\([^()]*\))?(?:\[[^\[\]]*\])?)"  # DeltaJ, A[1], G_c[0,1], chi_bb-cc(14N)
@@ -153,7 +153,7 @@ def parameters(
 
     Examples
     --------
-    >>> from rotor.tops.constants import Constants
+    >>> from rotor.tops.constants.constants import Constants
     >>> set_ = Constants(A=9.0, B=3.0, C=2.0)
     >>> parameters(set_, ["A", "B"], ties=["C = B - 1"]).to_constants(np.array([9.5, 3.5])).tolist()
     [9.5, 3.5, 2.5]
@@ -190,7 +190,7 @@ def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
 
     Raises ValueError for a name that does not belong to the kind of top or the reduction, and for a missing state or spin.
 
-    >>> from rotor.tops.constants import Constants
+    >>> from rotor.tops.constants.constants import Constants
     >>> with_names(Constants(B=6081.5), ["D"]).values["D"]
     0.0
     """

@@ -13,7 +13,7 @@ from rotor.fitting.parameters import Parameters
 from rotor.fitting.top_constants import DIPOLES, ConstantSet
 from rotor.statistics.least_squares import Minimum
 from rotor.statistics.regression import Regression
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.covariance import Covariance
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """All constants of a top with further states and spins, in one set of names for the fit.
 
-    A, DeltaJ              of state 0, as in `rotor.tops.constants`
+    A, DeltaJ              of state 0, as in `rotor.tops.constants.constants`
     E[1], A[1], DeltaJ[1]  of state 1
     G_c[0,1], W[0,1]       between states 0 and 1, see `rotor.quantum.effects.interactions`
     chi_aa(14N)            of spins, in all states; chi_aa(14N)[1] is the difference of state 1
@@ -22,13 +22,13 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.parameter_names import parse_name
+from rotor.tops.constants.uncertain_numbers import write_number
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
-from rotor.tops.parameter_names import parse_name
 from rotor.tops.spins.spin_constants import SpinConstants, spin_names
 from rotor.tops.states.state_constants import StateConstants, state_numbers
 from rotor.tops.top import Top
-from rotor.tops.uncertain_numbers import write_number
 
 DIPOLES = ("mu_a", "mu_b", "mu_c")
 

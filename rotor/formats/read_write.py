@@ -13,7 +13,7 @@ from rotor.checks import require_file
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import find_reader, find_writer
 from rotor.molecules.readers.sdf_entries import BUILT, parse_entry
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.top import Top
 

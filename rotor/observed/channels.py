@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.observed.fit import FitChoices, SourceFit, fit_source
-from rotor.observed.model import KM_PER_S, Component, Sight, model
+from rotor.observed.model.model import KM_PER_S, Component, Sight, model
 from rotor.observed.spectrum import ObservedSpectrum
 
 _ROUNDS = 10

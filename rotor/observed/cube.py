@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.observed.fit import FitChoices, SourceFit, fit_source
-from rotor.observed.model import Component, Sight
+from rotor.observed.model.model import Component, Sight
+from rotor.observed.model.variables import variables
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.observed.start import velocity_and_width
-from rotor.observed.variables import variables
 
 _CHANCE = 4.0  # largest χ²/ν of noise alone, in standard deviations above 1
 

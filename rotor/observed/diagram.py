@@ -18,9 +18,9 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.observed.model import KM_PER_S, Component, Sight, escape, model
+from rotor.observed.model.model import KM_PER_S, Component, Sight, escape, model
 from rotor.observed.spectrum import ObservedSpectrum
-from rotor.spectra.emission import planck_k
+from rotor.spectra.emission.emission import planck_k
 from rotor.table import Table, counted
 
 _REACH = 2.0  # range of integration on either side of a line, in line widths

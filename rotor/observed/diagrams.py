@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor.observed.diagram import RotationalDiagram, rotational_diagram
-from rotor.observed.model import Component, Sight
+from rotor.observed.model.model import Component, Sight
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.table import Table
 

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.observed.model import Component, Sight, model
+from rotor.observed.model.model import Component, Sight, model
+from rotor.observed.model.variables import DEFAULT_FREE, Variables, variables
 from rotor.observed.spectrum import KELVIN, ObservedSpectrum, band_text
-from rotor.observed.variables import DEFAULT_FREE, Variables, variables
 from rotor.statistics.least_squares import Iteration, Minimum
 from rotor.statistics.regression import Regression, regression
 from rotor.table import Table

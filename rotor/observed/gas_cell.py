@@ -18,10 +18,10 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.observed.fit import FitChoices, SourceFit
-from rotor.observed.model import KM_PER_S, Component, Sight, component_depth
-from rotor.observed.species import SpeciesLines
+from rotor.observed.model.model import KM_PER_S, Component, Sight, component_depth
+from rotor.observed.model.species import SpeciesLines
+from rotor.observed.model.variables import variables
 from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum, band_text
-from rotor.observed.variables import variables
 from rotor.statistics.regression import regression
 
 _LN10 = math.log(10)

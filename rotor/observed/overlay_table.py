@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.observed.gas_cell import absorbance
-from rotor.observed.model import KM_PER_S, Component, Sight, model
+from rotor.observed.model.model import KM_PER_S, Component, Sight, model
 from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum
 from rotor.table import ColumnTable
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.observed.fit import SourceFit, prior_widths
-from rotor.observed.model import model
+from rotor.observed.model.model import model
 from rotor.observed.spectrum import KELVIN
 from rotor.table import Table
 

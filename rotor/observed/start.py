@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.observed.model import KM_PER_S, Component, Sight, component_depth
-from rotor.observed.species import SpeciesLines
+from rotor.observed.model.model import KM_PER_S, Component, Sight, component_depth
+from rotor.observed.model.species import SpeciesLines
 from rotor.observed.spectrum import ObservedSpectrum
-from rotor.spectra.emission import planck_k
+from rotor.spectra.emission.emission import planck_k
 
 TEMPERATURES_K = (10.0, 20.0, 40.0, 80.0, 160.0, 300.0)
 WIDTHS_KM_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)

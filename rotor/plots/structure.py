@@ -67,7 +67,7 @@ def picture(answer: StructureAnswer, *, title: str | None = None) -> Picture:
 
 
 def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: int, up: int) -> None:
-    from rotor.fitting.publication import value_text
+    from rotor.fitting.reports.publication import value_text
     from rotor.structures.coordinates import named
 
     x = molecule.positions_angstrom

@@ -21,7 +21,7 @@ from rotor.quantum.basis.state_elements import Link, StateElements, StateTerms
 from rotor.quantum.effect import Coupling, QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.levels import Levels, SolvedBlock, levels_of_blocks, placed
 from rotor.quantum.wang.basis import Part, blocks_within, names_of, parts_of
-from rotor.tops.operators import Operators
+from rotor.tops.constants.operators import Operators
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rotor.frozen import dataclass
-from rotor.tops.operators import Operators, added
+from rotor.tops.constants.operators import Operators, added
 
 if TYPE_CHECKING:
     from rotor.quantum.operators.algebra import Operator

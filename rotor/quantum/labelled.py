@@ -22,8 +22,8 @@ from rotor.quantum.linear_stacks import LinearStack, numbered
 from rotor.quantum.wang.basis import SPECIES, WangBlock, names_of_blocks, wang_blocks
 from rotor.quantum.wang.wang_matrix import diagonal_elements
 from rotor.table import with_article
-from rotor.tops.constants import Constants
-from rotor.tops.operators import REPRESENTATIONS
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.operators import REPRESENTATIONS
 
 AT_ZERO_MHZ = 1e-30  # in place of 0: a free constant that starts there must not be left out of the Hamiltonian
 

@@ -30,9 +30,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
-from rotor.tops.constants import Constants
-from rotor.tops.covariance import Covariance
-from rotor.tops.operators import Operators, Powers, axis_order, distortion_terms
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.covariance import Covariance
+from rotor.tops.constants.operators import Operators, Powers, axis_order, distortion_terms
 
 # the quartic and quadratic terms by (p, q, n), and what each is in Jα⁴, JαJα JβJβ + JβJβ JαJα, Jα², for (x, y, z, xy, yz, zx)
 _TERMS: tuple[Powers, ...] = (

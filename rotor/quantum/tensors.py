@@ -36,7 +36,7 @@ from rotor.arrays import Floats
 from rotor.frozen import dataclass
 from rotor.quantum.symmetric_top_elements import coupling, sign_of, wang_coupling
 from rotor.quantum.wang.basis import WangBlock
-from rotor.tops.operators import axis_order as axis_order
+from rotor.tops.constants.operators import axis_order as axis_order
 
 Complexes = NDArray[np.complex128]
 

@@ -14,7 +14,7 @@ from rotor.tops.facts import top_formula
 
 if TYPE_CHECKING:
     from rotor.thermodynamics.sums.partition import PartitionFunction
-    from rotor.tops.constants import Constants
+    from rotor.tops.constants.constants import Constants
     from rotor.tops.top import Top
 
 LONGEST = 72  # characters of one source in the short line
@@ -120,7 +120,7 @@ def report_on_top(
 ) -> Callable[[Any, Any], Iterable[Part | None]]:
     """The function `show` of a verb on the top of its request: heading, facts, further parts; then sources, errors and what is left out.
 
-    facts: of an answer and the content of its JSON. parts: of an answer and its report (`rotor.verbs.outputs.Report`).
+    facts: of an answer and the content of its JSON. parts: of an answer and its report (`rotor.verbs.common.outputs.Report`).
     sources: tables of the top that are cited. title: of an answer.
     """
 

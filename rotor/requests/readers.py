@@ -61,7 +61,7 @@ class Field:
     help: one line, without a full stop.
     key: table and key in a scene, such as "conditions.temperature"; a key without a table stands before the first table; "" for none.
     option: name on the command line; None derives it from the key, "" means none; without a leading "-" it is an argument by position.
-    hidden: another option sets this field together with others (`rotor.verbs.verb.Extra`).
+    hidden: another option sets this field together with others (`rotor.verbs.common.verb.Extra`).
     none: the word that stands for None.
     common: whether --help lists the option; --help-all lists all.
     example: value in a template if the default is None.

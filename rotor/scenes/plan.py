@@ -14,8 +14,8 @@ from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
 from rotor.scenes.run import Where, files_of, scene_calculation
 from rotor.scenes.scene import Scene, checked_scene
 from rotor.scenes.sweep.points import Points, is_sweep, points, text_of
-from rotor.verbs.calculation import Calculation, NoResultError
-from rotor.verbs.verb import Verb
+from rotor.verbs.common.calculation import Calculation, NoResultError
+from rotor.verbs.common.verb import Verb
 
 MOST_POINTS = 20  # of a sweep: each is planned
 SHARE = 0.1  # of the model or data error: a smaller numerical error does not matter

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from rotor.scenes.scene import SCHEMA, Scene, checked_scene, keyed, scene_of, scene_text
-from rotor.verbs.calculation import Calculation, Outcome
-from rotor.verbs.outputs import Files
-from rotor.verbs.verb import Note, Work, silent, verb_of
+from rotor.verbs.common.calculation import Calculation, Outcome
+from rotor.verbs.common.outputs import Files
+from rotor.verbs.common.verb import Note, Work, silent, verb_of
 
 Where = str | os.PathLike[str]
 

@@ -24,12 +24,12 @@ from rotor.requests.fill import Entries
 from rotor.requests.lists import Each, NameList
 from rotor.requests.readers import Custom, Field, Flag, Names, Quantity, Text
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.outputs import Output
-from rotor.verbs.verb import Verb, verb_of
+from rotor.verbs.common.outputs import Output
+from rotor.verbs.common.verb import Verb, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan
-    from rotor.verbs.calculation import Outcome
+    from rotor.verbs.common.calculation import Outcome
 
 SCHEMA = 1
 Keys = Mapping[str, Field]  # fields of a table by key

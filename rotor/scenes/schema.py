@@ -11,7 +11,7 @@ from rotor.requests.field import REQUIRED
 from rotor.requests.readers import Field
 from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, kinds_in, shown_default, tables_of, value_kinds
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 TITLES = {
     "body": "A rigid body instead of a molecule, in any coherent units.",

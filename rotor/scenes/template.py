@@ -10,7 +10,7 @@ from rotor.requests.choices import Choices
 from rotor.requests.readers import Field
 from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, inner_tables, shown_default, tables_of
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.verb import Verb, verb_of
+from rotor.verbs.common.verb import Verb, verb_of
 
 EXAMPLES = {
     "pulses": ("gaussian", "or switched, kick, table, thz"),

@@ -39,7 +39,7 @@ from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.spectra.lines import Lines
 from rotor.spectra.profiles import gaussian
 from rotor.spectra.spectrum import Spectrum
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -46,12 +46,12 @@ from rotor.spectra.intensity import (
     population,
     require_cut,
 )
-from rotor.spectra.transitions import all_transitions
+from rotor.spectra.transitions.pairs import all_transitions
 from rotor.table import counted
 from rotor.thermodynamics.sums.partition import PartitionFunction, partition_function
 from rotor.thermodynamics.sums.trusted_levels import are_trusted, in_level_table
 from rotor.thermodynamics.vibration import VibrationalStates
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.covariance import Covariance
 from rotor.tops.facts import without_constants
 
 if TYPE_CHECKING:

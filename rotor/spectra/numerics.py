@@ -23,7 +23,7 @@ from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 from rotor.spectra.intensity_accuracy import intensity_error
-from rotor.spectra.raman_request import SECTION, answer_raman
+from rotor.spectra.raman.request import SECTION, answer_raman
 from rotor.spectra.request import INTENSITY, answer_spectrum
 from rotor.spectra.widths import doppler, pressure_width
 

@@ -34,7 +34,7 @@ from rotor.thermodynamics.sums.classical_limit import typical_j
 from rotor.thermodynamics.sums.partition_table import partition_facts
 from rotor.thermodynamics.vibration import VibrationalStates, missing_fundamentals
 from rotor.thermodynamics.vibration_input import vibrations_field
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.covariance import Covariance
 from rotor.tops.facts import top_facts, without_constants
 
 if TYPE_CHECKING:

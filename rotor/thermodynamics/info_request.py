@@ -20,7 +20,7 @@ from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.table import Table
 from rotor.thermodynamics.sums.classical_limit import populated_j
 from rotor.thermodynamics.sums.partition_table import partition_table
-from rotor.tops.constants_budget import constants_budget
+from rotor.tops.constants.budget import constants_budget
 from rotor.tops.facts import top_facts
 from rotor.tops.top import Top
 

@@ -19,9 +19,9 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.molecules.force_field import ForceField
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.operators import axis_order
 from rotor.tops.inertial_defect import inertia_by_modes, inertial_defect_u_angstrom2, is_planar
-from rotor.tops.operators import axis_order
 from rotor.tops.top import Top
 from rotor.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, ROTATIONAL_MHZ_U_ANGSTROM2
 

@@ -26,12 +26,12 @@ from rotor.tops.allowed import (
     refuse_forbidden_polarizability,
 )
 from rotor.tops.components import Tensor, dipole_line, dipole_vector, in_frame, symmetric_tensor, tensor_in_frame
-from rotor.tops.constants import Constants, constants_from_moments
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.constants import Constants, constants_from_moments
+from rotor.tops.constants.covariance import Covariance
+from rotor.tops.constants.named_values import constants_from_names, parse_fields
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.magnetic import MagneticTensors
-from rotor.tops.named_values import constants_from_names, parse_fields
 from rotor.tops.quadrupole import computed_couplings
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights

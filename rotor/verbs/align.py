@@ -16,10 +16,10 @@ from rotor.requests.field import CONDITIONS, REQUIRED, all_fields, declared_fiel
 from rotor.requests.fill import Entries, NamedError, read_fields, within
 from rotor.requests.readers import Quantity
 from rotor.table import counted
-from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
-from rotor.verbs.outputs import Report, picture, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Extra, Subject, Verb
+from rotor.verbs.common.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.common.outputs import Report, picture, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Extra, Subject, Verb
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace

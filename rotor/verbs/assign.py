@@ -17,13 +17,13 @@ from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom, Range, Text
 from rotor.table import counted
-from rotor.verbs.outputs import Output, Report, picture, table_file
-from rotor.verbs.subjects import saved_inputs
-from rotor.verbs.verb import Place, Subject, SubjectKind, Verb, Work
+from rotor.verbs.common.outputs import Output, Report, picture, table_file
+from rotor.verbs.common.subjects import saved_inputs
+from rotor.verbs.common.verb import Place, Subject, SubjectKind, Verb, Work
 
 if TYPE_CHECKING:
     from rotor.assignment.answer import AssignAnswer, AssignedSpecies
-    from rotor.assignment.progressions import Progression
+    from rotor.assignment.peaks.progressions import Progression
 
 EXAMPLES = """\
   rotor assign peaks.csv
@@ -134,7 +134,7 @@ def show(answer: AssignAnswer, report: Report) -> Iterable[Part | None]:
 
 def _progression_text(progression: Progression) -> str:
     """Lines and constants of a linear top among the peaks that are left."""
-    from rotor.fitting.publication import value_text
+    from rotor.fitting.reports.publication import value_text
 
     values = zip("BD", progression.constants_mhz.tolist(), progression.errors_mhz.tolist(), strict=True)
     constants = ", ".join(f"{name} {value_text(value, error)}" for name, value, error in values)
@@ -160,7 +160,7 @@ def _verdict(answer: AssignAnswer) -> str:
 
 
 def _table(number: int, species: AssignedSpecies) -> Table:
-    from rotor.fitting.publication import value_text
+    from rotor.fitting.reports.publication import value_text
 
     constants, undetermined = species.constants, species.refined.open_constants
     columns = {

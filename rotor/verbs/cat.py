@@ -19,10 +19,10 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OUTPUT, REQUIRED, changed_fields, declared
 from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
 from rotor.table import counted
-from rotor.verbs.molecule import with_some_dipole
-from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
-from rotor.verbs.subjects import top_of_word
-from rotor.verbs.verb import ErrorsShown, Note, Tool, Work
+from rotor.verbs.common.molecule import with_some_dipole
+from rotor.verbs.common.outputs import Output, Report, draw_answer, picture, tables
+from rotor.verbs.common.subjects import top_of_word
+from rotor.verbs.common.verb import ErrorsShown, Note, Tool, Work
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.compare import Comparison

@@ -17,8 +17,8 @@ from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
 from rotor.table import ColumnTable
 from rotor.table import Table as Columns
-from rotor.verbs.outputs import table_file
-from rotor.verbs.verb import ErrorsShown, Tool, Work
+from rotor.verbs.common.outputs import table_file
+from rotor.verbs.common.verb import ErrorsShown, Tool, Work
 
 ADD, LIST, SHOW = ACTIONS = ("add", "list", "show")
 EXAMPLES = """\

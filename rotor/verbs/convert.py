@@ -12,10 +12,10 @@ from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Text, Whole
 from rotor.tops.facts import top_facts
-from rotor.verbs.molecule import refuse_weights_of_another_kind
-from rotor.verbs.outputs import Output, Report
-from rotor.verbs.subjects import top_of_word
-from rotor.verbs.verb import ErrorsShown, Note, Tool, Work, silent
+from rotor.verbs.common.molecule import refuse_weights_of_another_kind
+from rotor.verbs.common.outputs import Output, Report
+from rotor.verbs.common.subjects import top_of_word
+from rotor.verbs.common.verb import ErrorsShown, Note, Tool, Work, silent
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile
@@ -55,7 +55,7 @@ class Converted:
     @property
     def errors(self) -> ErrorBudget | None:
         """Error budget of the constants; None for an .int file, which holds no constants."""
-        from rotor.tops.constants_budget import constants_budget
+        from rotor.tops.constants.budget import constants_budget
 
         return None if self.target.lower().endswith(".int") else constants_budget([self.top])
 

@@ -18,10 +18,9 @@ from rotor.requests.field import OUTPUT, REQUIRED, all_fields, declared, declare
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
 from rotor.requests.readers import Custom, Field, Quantity, Text, Whole
-from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
+from rotor.spectra.emission.request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
-from rotor.verbs.emission_observed import OBSERVED
-from rotor.verbs.molecule import (
+from rotor.verbs.common.molecule import (
     FIELDS,
     STATES,
     MoleculeInput,
@@ -31,13 +30,14 @@ from rotor.verbs.molecule import (
     top_of,
     with_some_dipole,
 )
-from rotor.verbs.observed_file import SeveralInput, is_catalogue
-from rotor.verbs.outputs import Report, picture, table_file, tables
-from rotor.verbs.subjects import beside, saved_molecule
-from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb
+from rotor.verbs.common.outputs import Report, picture, table_file, tables
+from rotor.verbs.common.subjects import beside, saved_molecule
+from rotor.verbs.common.verb import Place, Shown, Subject, SubjectKind, Verb
+from rotor.verbs.measurements.emission_observed import OBSERVED
+from rotor.verbs.measurements.observed_file import SeveralInput, is_catalogue
 
 if TYPE_CHECKING:
-    from rotor.spectra.emitters import CatalogueLines
+    from rotor.spectra.emission.emitters import CatalogueLines
 
 EXAMPLES = """\
   rotor emission CO --range 115.1:115.4GHz --column 1e17 --excitation 20 --width 2

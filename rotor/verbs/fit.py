@@ -18,12 +18,12 @@ from rotor.requests.fill import NamedError
 from rotor.requests.lists import NameList
 from rotor.requests.readers import Flag, Rule, Text, Whole
 from rotor.table import ColumnTable
-from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
-from rotor.verbs.outputs import Output, Report, picture, tables, write_text
-from rotor.verbs.verb import ErrorsShown, Extra, Verb, Work
+from rotor.verbs.common.outputs import Output, Report, picture, tables, write_text
+from rotor.verbs.common.verb import ErrorsShown, Extra, Verb, Work
+from rotor.verbs.measurements.measured_lines import FitInput, MeasuredLines, build
 
 if TYPE_CHECKING:
-    from rotor.fitting.choose import Suggestion, Trial
+    from rotor.fitting.choice.choose import Suggestion, Trial
     from rotor.fitting.result import Fit
     from rotor.formats.fits.fit_request import FitAnswer, FitRequest
 
@@ -213,7 +213,7 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
 
 
 def _line_records(fit: Fit) -> list[dict[str, Any]]:
-    from rotor.fitting.report import dfbetas
+    from rotor.fitting.reports.report import dfbetas
 
     lines = fit.lines
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
@@ -240,7 +240,7 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
 
 def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
     """Parameters with errors, statistics and analyses."""
-    from rotor.fitting.report import far_off, statistics_text, status_text
+    from rotor.fitting.reports.report import far_off, statistics_text, status_text
 
     fit = answer.fit
     yield f"{answer.request.title}: {status_text(fit)}"
@@ -257,7 +257,7 @@ def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
 
 def _advice(fit: Fit) -> list[tuple[str, str]] | None:
     """What may help a fit that failed with most lines far off, not because of a single one: distortion constants that are not free."""
-    from rotor.fitting.report import mostly_off, outlier, quartics_not_free
+    from rotor.fitting.reports.report import mostly_off, outlier, quartics_not_free
 
     names = "" if fit.converged or not mostly_off(fit) or outlier(fit) else ",".join(quartics_not_free(fit))
     if not names:
@@ -270,8 +270,8 @@ def _advice(fit: Fit) -> list[tuple[str, str]] | None:
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
-    from rotor.fitting.publication import value_text
-    from rotor.fitting.report import error_text, parameter_units, scatter_text
+    from rotor.fitting.reports.publication import value_text
+    from rotor.fitting.reports.report import error_text, parameter_units, scatter_text
 
     values, errors, scaled = (numbers.tolist() for numbers in (fit.values, fit.errors, fit.scaled_errors))
 

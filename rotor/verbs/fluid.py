@@ -27,9 +27,9 @@ from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, decla
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
-from rotor.verbs.outputs import Output, Report, drawing, picture
-from rotor.verbs.subjects import beside
-from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb, Work, facts_named
+from rotor.verbs.common.outputs import Output, Report, drawing, picture
+from rotor.verbs.common.subjects import beside
+from rotor.verbs.common.verb import Place, Shown, Subject, SubjectKind, Verb, Work, facts_named
 
 if TYPE_CHECKING:
     from ase import Atoms

@@ -14,10 +14,10 @@ from rotor.reports.progress import counting
 from rotor.reports.screen import Table, record_table, sampled
 from rotor.requests.fill import Entries
 from rotor.thermodynamics.gas.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
-from rotor.verbs.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
-from rotor.verbs.outputs import Report, picture, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Verb, Work
+from rotor.verbs.common.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
+from rotor.verbs.common.outputs import Report, picture, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Verb, Work
 
 SHOWN = 11  # rows of the correlation functions in the report
 

@@ -13,16 +13,16 @@ from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
-from rotor.spectra.emission import BACKGROUND_K
+from rotor.spectra.emission.emission import BACKGROUND_K
 from rotor.table import counted
-from rotor.verbs.observed_file import SpectrumFile, json_of, layer_field, padded, spectrum_facts
-from rotor.verbs.outputs import PICTURES, Output, Report, table_file
-from rotor.verbs.verb import ErrorsShown, Tool, Work
+from rotor.verbs.common.outputs import PICTURES, Output, Report, table_file
+from rotor.verbs.common.verb import ErrorsShown, Tool, Work
+from rotor.verbs.measurements.observed_file import SpectrumFile, json_of, layer_field, padded, spectrum_facts
 
 if TYPE_CHECKING:
-    from rotor.observed.identify import Identification
-    from rotor.observed.model import Sight
-    from rotor.observed.species import SpeciesLines
+    from rotor.observed.identification.identify import Identification
+    from rotor.observed.model.model import Sight
+    from rotor.observed.model.species import SpeciesLines
     from rotor.observed.spectrum import ObservedSpectrum
     from rotor.requests.budget import ErrorBudget
 
@@ -83,8 +83,8 @@ class Identified:
 
 def answer(request: IdentifyRequest, work: Work) -> Identified:
     """The species, ranked by evidence."""
-    from rotor.observed.identify import identify
-    from rotor.observed.selection import IdentifyChoices
+    from rotor.observed.identification.identify import identify
+    from rotor.observed.identification.selection import IdentifyChoices
 
     choices = IdentifyChoices(
         velocity_km_s=request.velocity_km_s,

@@ -11,12 +11,12 @@ from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Table, record_table
 from rotor.requests.fill import read_fields
 from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
-from rotor.tops.uncertain_numbers import known_digits
+from rotor.tops.constants.uncertain_numbers import known_digits
 from rotor.units import MHZ_PER_CM
-from rotor.verbs.molecule import POLARIZABILITY
-from rotor.verbs.outputs import Report, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Verb, facts_named
+from rotor.verbs.common.molecule import POLARIZABILITY
+from rotor.verbs.common.outputs import Report, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Verb, facts_named
 
 EXAMPLES = """\
   rotor info water

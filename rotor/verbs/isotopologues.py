@@ -7,13 +7,13 @@ from collections.abc import Iterable
 from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
+from rotor.tops.constants.uncertain_numbers import known_digits
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
-from rotor.tops.uncertain_numbers import known_digits
-from rotor.verbs.molecule import POLARIZABILITY, REFINEMENT, STATES
-from rotor.verbs.outputs import Report, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import ErrorsShown, Verb
+from rotor.verbs.common.molecule import POLARIZABILITY, REFINEMENT, STATES
+from rotor.verbs.common.outputs import Report, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import ErrorsShown, Verb
 
 EXAMPLES = """\
   rotor isotopologues water

@@ -17,10 +17,10 @@ from rotor.reports.screen import Table, record_table, table_records
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.lists import whole_range
 from rotor.requests.readers import Text, Whole
-from rotor.verbs.molecule import DIPOLE, POLARIZABILITY
-from rotor.verbs.outputs import Output, Report, drawing, picture, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Extra, Shown, Verb
+from rotor.verbs.common.molecule import DIPOLE, POLARIZABILITY
+from rotor.verbs.common.outputs import Output, Report, drawing, picture, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Extra, Shown, Verb
 
 COLUMNS = {
     "MHz": ("energy_mhz", "{energy:.4f}"),

@@ -13,7 +13,7 @@ from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, plain
 from rotor.requests.field import declared
 from rotor.requests.readers import Text
-from rotor.verbs.verb import Tool, Work
+from rotor.verbs.common.verb import Tool, Work
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile

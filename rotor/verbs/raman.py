@@ -8,11 +8,11 @@ from typing import Any
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title, labelled_rows, states_text
 from rotor.reports.screen import Part, record_table
-from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
-from rotor.verbs.molecule import DIPOLE, REFINEMENT, with_known_polarizability
-from rotor.verbs.outputs import Report, picture, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import LinesShown, Verb
+from rotor.spectra.raman.request import RamanAnswer, RamanRequest, answer_raman
+from rotor.verbs.common.molecule import DIPOLE, REFINEMENT, with_known_polarizability
+from rotor.verbs.common.outputs import Report, picture, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import LinesShown, Verb
 
 EXAMPLES = """\
   rotor raman N2

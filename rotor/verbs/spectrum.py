@@ -19,13 +19,13 @@ from rotor.requests.field import OBSERVABLES, OUTPUT, changed_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Rule, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
-from rotor.verbs import int_files
-from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_output
-from rotor.verbs.molecule import POLARIZABILITY, range_without_unit, with_some_dipole
-from rotor.verbs.outputs import PICTURES, Output, Report, draw_answer, picture, table_file, tables
-from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
-from rotor.verbs.subjects import INT_FILE_IN_SCENE, OneMolecule
-from rotor.verbs.verb import LinesShown, Place, Subject, Verb, Work
+from rotor.verbs.common import int_files
+from rotor.verbs.common.long_lists import LongAnswer, answer_long, is_long, refuse_long_output
+from rotor.verbs.common.molecule import POLARIZABILITY, range_without_unit, with_some_dipole
+from rotor.verbs.common.outputs import PICTURES, Output, Report, draw_answer, picture, table_file, tables
+from rotor.verbs.common.subjects import INT_FILE_IN_SCENE, OneMolecule
+from rotor.verbs.common.verb import LinesShown, Place, Subject, Verb, Work
+from rotor.verbs.measurements.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0

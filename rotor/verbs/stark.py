@@ -23,10 +23,10 @@ from rotor.reports.field_maps import (
 from rotor.reports.screen import Table, record_table
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
-from rotor.verbs.molecule import REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
-from rotor.verbs.outputs import PICTURES, Output, Report, picture, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Shown, Verb
+from rotor.verbs.common.molecule import REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.common.outputs import PICTURES, Output, Report, picture, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Shown, Verb
 
 if TYPE_CHECKING:
     from rotor.spectra.fields.stark_coefficients import StarkCoefficients

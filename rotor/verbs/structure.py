@@ -16,9 +16,9 @@ from rotor.requests.field import MOLECULE, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
 from rotor.table import counted
-from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables, write_text
-from rotor.verbs.subjects import file_name, saved_inputs
-from rotor.verbs.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
+from rotor.verbs.common.outputs import Output, Report, draw_answer, picture, tables, write_text
+from rotor.verbs.common.subjects import file_name, saved_inputs
+from rotor.verbs.common.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
 
 if TYPE_CHECKING:
     from rotor.structures.substitution import SubstitutionStructure, Value
@@ -168,7 +168,7 @@ def _values_table(method: str, values: Sequence[Value]) -> Table:
 
 
 def _value_text(value: float, error: float) -> str:
-    from rotor.fitting.publication import value_text
+    from rotor.fitting.reports.publication import value_text
 
     if not math.isfinite(error):
         return f"{value:.6g} (no error)"

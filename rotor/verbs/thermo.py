@@ -12,10 +12,10 @@ from rotor.reports.screen import Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics.functions import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
-from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
-from rotor.verbs.outputs import Report, picture, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Extra, Verb
+from rotor.verbs.common.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
+from rotor.verbs.common.outputs import Report, picture, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Extra, Verb
 
 SHOWN = 25  # rows of the table in the report
 

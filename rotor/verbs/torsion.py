@@ -12,10 +12,10 @@ from rotor.reports.progress import progress_bar
 from rotor.reports.screen import Table, record_table, table_records
 from rotor.requests.readers import Rule
 from rotor.thermodynamics.torsion.request import TorsionAnswer, TorsionRequest, answer_torsion
-from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
-from rotor.verbs.outputs import Report, picture, table_file
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Verb, Work, facts_named
+from rotor.verbs.common.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
+from rotor.verbs.common.outputs import Report, picture, table_file
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Verb, Work, facts_named
 
 EXAMPLES = """\
   rotor torsion C2H6 --bond 1-2

@@ -10,10 +10,10 @@ from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.fill import NamedError, within
 from rotor.requests.readers import Rule
-from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
-from rotor.verbs.outputs import Output, Report, drawing, picture, tables
-from rotor.verbs.turning_body import MotionInput, TurningBody, build
-from rotor.verbs.verb import Verb, Work, facts_named
+from rotor.verbs.common.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
+from rotor.verbs.common.outputs import Output, Report, drawing, picture, tables
+from rotor.verbs.common.turning_body import MotionInput, TurningBody, build
+from rotor.verbs.common.verb import Verb, Work, facts_named
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats

@@ -21,10 +21,10 @@ from rotor.requests.field import CONDITIONS, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, within
 from rotor.requests.lists import Numbers
 from rotor.tops.magnetic import MagneticTensors, tensor_for
-from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
-from rotor.verbs.outputs import Report, picture, tables
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Verb
+from rotor.verbs.common.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
+from rotor.verbs.common.outputs import Report, picture, tables
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Verb
 
 if TYPE_CHECKING:
     from rotor.tops.magnetic import Tensor

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotor.viewer.fits import fit_assignments, fit_species
+from rotor.viewer.actions.fits import fit_assignments, fit_species
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import Line
 

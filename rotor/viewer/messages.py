@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rotor.assignment.peaks import PeakList
+from rotor.assignment.peaks.peak_list import PeakList
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.viewer.prediction import Predictions
 from rotor.viewer.records import Line, Record, Species, State

@@ -10,15 +10,15 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rotor.assignment.peaks import PeakList
+from rotor.assignment.peaks.peak_list import PeakList
 from rotor.checks import require_file
 from rotor.formats.packed import first_bytes
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
+from rotor.viewer.actions.species_actions import add_species
 from rotor.viewer.messages import Context
 from rotor.viewer.records import SpectrumFile
 from rotor.viewer.service import Service
 from rotor.viewer.session import SUFFIX, Session, check_spectrum, is_session, read_session, spectrum_file
-from rotor.viewer.species_actions import add_species
 
 Note = Callable[[str], None]
 _READABLE = f"expected a spectrum (text, FITS or .npy) or a session ({SUFFIX})"

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.checks import no_molecule
+from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.parameters import with_names
 from rotor.fitting.top_constants import ConstantSet, TopConstants
-from rotor.fitting.top_levels import label_model
 from rotor.formats.lines.assigned_lines import QUANTA
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.labelled import MissingLevelsError
@@ -30,12 +30,12 @@ from rotor.quantum.quanta import SPECIES_NUMBERS
 from rotor.spectra.intensity import highest_j
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.thermodynamics.sums.partition import partition_function
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 from rotor.viewer.records import Species
 
 if TYPE_CHECKING:
-    from rotor.observed.species import SpeciesLines
+    from rotor.observed.model.species import SpeciesLines
 
 T = TypeVar("T")
 MOST_J = 250  # of levels, so that a page does not wait for minutes
@@ -84,7 +84,7 @@ def with_assumed_dipole(top: Top) -> tuple[Top, str]:
     """The top with a dipole, and a remark where it is estimated, or assumed as 1 D along each allowed axis."""
     if top.dipole_abc_debye is not None:
         return top, ""
-    from rotor.verbs.molecule import MoleculeInput, Reading, with_some_dipole
+    from rotor.verbs.common.molecule import MoleculeInput, Reading, with_some_dipole
 
     remarks: list[str] = []
     try:
@@ -300,7 +300,7 @@ class Predictions:
 
     def emitter(self, record: Species) -> SpeciesLines:
         """The lines of a record for emission models, with Q(T)."""
-        from rotor.observed.species import species_from_lines
+        from rotor.observed.model.species import species_from_lines
 
         key = _key(record)
         if key not in self._emitters:

@@ -15,14 +15,14 @@ import msgspec
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.assignment.peaks import PeakList
+from rotor.assignment.peaks.peak_list import PeakList
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.version import version
-from rotor.viewer.actions import ACTIONS, REFITTED_AFTER
+from rotor.viewer.actions.actions import ACTIONS, REFITTED_AFTER
+from rotor.viewer.actions.fits import assigned_levels
+from rotor.viewer.actions.joint_fits import line_residuals, lines_alone, refits, shared_blends
+from rotor.viewer.actions.line_actions import import_lines, peak_in
 from rotor.viewer.exports import exported
-from rotor.viewer.fits import assigned_levels
-from rotor.viewer.joint_fits import line_residuals, lines_alone, refits, shared_blends
-from rotor.viewer.line_actions import import_lines, peak_in
 from rotor.viewer.loomis_wood import label_rows, row_centres, row_points
 from rotor.viewer.messages import Context, read_constants, read_number, read_species
 from rotor.viewer.prediction import Model, Predicted, Predictions, changed
@@ -81,7 +81,7 @@ class Service:
 
     def _search(self, message: Mapping[str, Any]) -> Answer:
         """Add species and lines by `rotor assign`; other messages are answered during the search."""
-        from rotor.viewer.from_search import search, search_records
+        from rotor.viewer.actions.from_search import search, search_records
 
         answer = search(self.spectrum, message, self.peaks)
         with self._lock:
@@ -218,7 +218,7 @@ class Service:
 
     def _emission(self, species: Mapping[int, Species], first: float, last: float, pixels: int) -> Answer:
         """Brightness (K) of the modelled emission of all species."""
-        from rotor.observed.model import Component, Sight, model
+        from rotor.observed.model.model import Component, Sight, model
 
         components = [
             Component(

@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.alignment import propagate
 from rotor.alignment.acting import acted_on, guessed_jmax, revival_period_ps
 from rotor.alignment.align import align
-from rotor.alignment.carry import GradientOf
 from rotor.alignment.classical import classical_trace
 from rotor.alignment.ensemble import thermal
 from rotor.alignment.observables import Harmonics, harmonic_sum, observable
+from rotor.alignment.propagation import propagate
+from rotor.alignment.propagation.carry import GradientOf
+from rotor.alignment.propagation.timeline import timeline
 from rotor.alignment.pulse import (
     RAD_PER_PS_MHZ,
     DipolePulse,
@@ -29,7 +30,6 @@ from rotor.alignment.pulse import (
     elliptical,
 )
 from rotor.alignment.request import AlignRequest, answer_align
-from rotor.alignment.timeline import timeline
 from rotor.quantum.estimates.limits import all_limits
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import field_space
@@ -406,7 +406,7 @@ def test_a_lower_j_max_has_the_same_cosines(monkeypatch, top, pulse, kelvin):
     """What a long pulse takes, looked for beneath the guess: both within what they state, and the edge is empty."""
     times = np.linspace(pulse.window_ps[0], pulse.window_ps[1] + 20, 41)
     guess = align(top, pulse, times, temperature_k=kelvin)
-    monkeypatch.setattr("rotor.alignment.steps.SEARCH_WORK", 0.0)
+    monkeypatch.setattr("rotor.alignment.propagation.steps.SEARCH_WORK", 0.0)
     lower = align(top, pulse, times, temperature_k=kelvin)
     assert lower.jmax < guess.jmax
     assert lower.edge_population < 1e-6
@@ -459,7 +459,7 @@ def test_bad_input_is_refused_by_name(call, message):
 
 
 def test_a_spherical_top_is_refused():
-    from rotor.tops.constants import Constants
+    from rotor.tops.constants.constants import Constants
 
     with pytest.raises(ValueError, match="spherical top"):
         align(Top.from_constants(Constants(B=5000.0, kind="spherical")), GaussianPulse(1e12, 1.0), [5.0])

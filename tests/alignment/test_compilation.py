@@ -34,7 +34,7 @@ def compiled_with(function: Any, *arguments: Any) -> list[str]:
 
 def call_of(name: str) -> tuple[Any, ...]:
     """A kernel and arguments of the smallest size."""
-    from rotor.alignment import _kernels as alignment
+    from rotor.alignment.propagation import _kernels as alignment
     from rotor.classical.integrators import _attitude_kernels as attitude
     from rotor.geometry import _kernels as geometry
 

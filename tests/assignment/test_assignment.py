@@ -17,11 +17,11 @@ from places import SHARED
 import rotor
 from rotor.assignment.answer import AssignAnswer
 from rotor.assignment.assign import answer_assign
-from rotor.assignment.bounds import Bounds
-from rotor.assignment.growth import prior_weight
-from rotor.assignment.peaks import PeakList, peak_list, spurs
+from rotor.assignment.peaks.peak_list import PeakList, peak_list, spurs
 from rotor.assignment.request import AssignRequest
-from rotor.assignment.rigid_table import PARAMETERS
+from rotor.assignment.search.bounds import Bounds
+from rotor.assignment.search.rigid_table import PARAMETERS
+from rotor.assignment.species.growth import prior_weight
 from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 
 REFERENCE = SHARED / "reference" / "broadband"

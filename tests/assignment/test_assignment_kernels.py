@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from rotor.arrays import Floats
-from rotor.assignment import _kernels, _sweep
-from rotor.assignment.bounds import Bounds
-from rotor.assignment.families import families
-from rotor.assignment.likelihood import ratio_at
-from rotor.assignment.peaks import PeakList, peak_list
-from rotor.assignment.rigid_table import JMAX, rigid_table
-from rotor.assignment.search import (
+from rotor.assignment.peaks.peak_list import PeakList, peak_list
+from rotor.assignment.search import _kernels, _sweep
+from rotor.assignment.search.bounds import Bounds
+from rotor.assignment.search.families import families
+from rotor.assignment.search.rigid_table import JMAX, rigid_table
+from rotor.assignment.search.roots import (
     BIN_MHZ,
     DETECTED,
     NEAR_MHZ,
@@ -26,6 +25,7 @@ from rotor.assignment.search import (
     quick_ratios,
     search_roots,
 )
+from rotor.assignment.species.likelihood import ratio_at
 from rotor.units import MHZ_PER_K
 
 BOUNDS = Bounds(np.array([1500.0, 700, 500]), np.array([4000.0, 2000, 1500]))

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.assignment import _kernels
-from rotor.assignment.bounds import Bounds, sample_tops
-from rotor.assignment.evidence import probability, word
-from rotor.assignment.families import families
-from rotor.assignment.grown import FEWEST_MOVED, Grown
-from rotor.assignment.likelihood import line_slopes, predict
-from rotor.assignment.peaks import peak_list
-from rotor.assignment.rigid_table import JMAX, PARAMETERS, rigid_table
-from rotor.assignment.search import Field
-from rotor.assignment.species import _mirrored_row
+from rotor.assignment.peaks.peak_list import peak_list
+from rotor.assignment.search import _kernels
+from rotor.assignment.search.bounds import Bounds, sample_tops
+from rotor.assignment.search.families import families
+from rotor.assignment.search.rigid_table import JMAX, PARAMETERS, rigid_table
+from rotor.assignment.search.roots import Field
+from rotor.assignment.species.evidence import probability, word
+from rotor.assignment.species.grown import FEWEST_MOVED, Grown
+from rotor.assignment.species.likelihood import line_slopes, predict
+from rotor.assignment.species.successive import _mirrored_row
 
 TOPS = [
     (2458.69, 490.426, 408.870, 2.6e-5, 6.7e-5, 2.0e-3, -4.3e-6, -5.8e-7),  # κ = -0.92

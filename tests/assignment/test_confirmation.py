@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from assignment_cases import BAND, SECOND, lines_of
 
-from rotor.assignment.bounds import Bounds
-from rotor.assignment.confirmation import _line_scales, confirmed
-from rotor.assignment.evidence import differs
-from rotor.assignment.families import Family
-from rotor.assignment.grown import Grown
-from rotor.assignment.growth import grow, prior_weight, quartic_sizes
-from rotor.assignment.likelihood import line_slopes, predict
-from rotor.assignment.peaks import PeakList, peak_list
-from rotor.assignment.rigid_table import PARAMETERS, rigid_table
-from rotor.assignment.search import Candidate, Field
-from rotor.assignment.species import multiples
+from rotor.assignment.peaks.peak_list import PeakList, peak_list
+from rotor.assignment.search.bounds import Bounds
+from rotor.assignment.search.families import Family
+from rotor.assignment.search.rigid_table import PARAMETERS, rigid_table
+from rotor.assignment.search.roots import Candidate, Field
+from rotor.assignment.species.confirmation import _line_scales, confirmed
+from rotor.assignment.species.evidence import differs
+from rotor.assignment.species.grown import Grown
+from rotor.assignment.species.growth import grow, prior_weight, quartic_sizes
+from rotor.assignment.species.likelihood import line_slopes, predict
+from rotor.assignment.species.successive import multiples
 
 PROLATE = {"A": 8636.7, "B": 703.9, "C": 650.8, "DJ": 3e-5, "DJK": 3e-4, "DK": 8e-3, "d1": -2e-6, "d2": -3e-7}
 

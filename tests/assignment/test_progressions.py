@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.assignment.peaks import peak_list
-from rotor.assignment.progressions import progressions
+from rotor.assignment.peaks.peak_list import peak_list
+from rotor.assignment.peaks.progressions import progressions
 
 ERROR = 0.01
 

@@ -13,12 +13,12 @@ from rotor.classical.effects.drag import LinearDrag
 from rotor.classical.effects.torques import ConstantTorque
 from rotor.classical.integrators import lie_runge_kutta
 from rotor.classical.integrators.method import integrate
-from rotor.fitting.criteria import aicc, f_test
+from rotor.fitting.choice.criteria import aicc, f_test
 from rotor.fluids.motion.bodies import _principal
-from rotor.observed.identify import identify
-from rotor.observed.model import Component
-from rotor.observed.partition import PartitionTable
-from rotor.observed.selection import IdentifyChoices
+from rotor.observed.identification.identify import identify
+from rotor.observed.identification.selection import IdentifyChoices
+from rotor.observed.model.model import Component
+from rotor.observed.model.partition import PartitionTable
 from rotor.structures.kraitchman import _used_moments
 
 

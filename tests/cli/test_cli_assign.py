@@ -12,7 +12,7 @@ from assignment_cases import BAND, TRUTH, is_right, lines_of, spectrum
 
 import rotor
 from rotor.assignment.assign import answer_assign
-from rotor.assignment.peak_finding import pick_peaks
+from rotor.assignment.peaks.peak_finding import pick_peaks
 from rotor.assignment.request import AssignRequest
 from rotor.formats.spectra.peak_files import peaks_from_columns, read_peaks
 

@@ -11,7 +11,7 @@ from matplotlib import image
 from rotor.formats.catalogue.cat_species import read_cat_species
 from rotor.formats.spectra.axis import ReadChoices
 from rotor.formats.spectra.cube_file import read_cube, read_mask
-from rotor.observed.model import Component, model
+from rotor.observed.model.model import Component, model
 from rotor.observed.spectrum import kelvin_per_jansky
 
 fits = pytest.importorskip("astropy.io.fits")

@@ -17,7 +17,7 @@ from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.formats.lines.assigned_lines import read_assigned_lines
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 
 Call = Callable[..., tuple[int, str, str]]
 RIGID = "A=5213.4471 B=1897.2265 C=1401.8812 MHz"

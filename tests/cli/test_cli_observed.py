@@ -9,7 +9,7 @@ import pytest
 from rotor.formats.catalogue import catdir
 from rotor.formats.catalogue.cat_species import read_cat_species
 from rotor.formats.catalogue.catdir import read_catdir
-from rotor.observed.model import Component, model
+from rotor.observed.model.model import Component, model
 
 CATDIR = """ 28503 CO, v=0    2   2.5595  2.2584  2.0369  1.9123  1.7370  1.4386  1.1429  0.8526  0.5733  0.3389  0.1479
  99501 XYZ         8   0.0     0.0     3.0000  2.8126  2.5485  2.0969  1.6454  1.1938  0.7423  0.3000  0.0000

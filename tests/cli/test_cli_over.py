@@ -13,9 +13,9 @@ import pytest
 from assignment_cases import BAND, TRUTH, lines_of, spectrum
 
 import rotor
-from rotor.assignment.intensities import fit_intensities, line_types, matched
-from rotor.assignment.peak_finding import pick_peaks
-from rotor.assignment.peaks import peak_list
+from rotor.assignment.peaks.intensities import fit_intensities, line_types, matched
+from rotor.assignment.peaks.peak_finding import pick_peaks
+from rotor.assignment.peaks.peak_list import peak_list
 from rotor.plots.spectra.over import loomis_wood_figure, over_figure
 from rotor.spectra.lines import Lines
 

@@ -12,7 +12,7 @@ import pytest
 
 import rotor
 from rotor.plots.show import write_picture
-from rotor.spectra.raman import raman_lines
+from rotor.spectra.raman.raman import raman_lines
 
 KEYS = {
     "temperature_k", "laser_nm", "anisotropy_angstrom3", "band_cross_section_cm2_per_sr", "q", "jmax", "jmax_source",

@@ -208,7 +208,7 @@ def slow(path):
     print("writing", flush=True)
     time.sleep(60)
 import rotor.verbs.spectrum as spectrum
-from rotor.verbs.outputs import Files
+from rotor.verbs.common.outputs import Files
 write = Files.write
 Files.write = lambda self, writers, **how: write(self, dict.fromkeys(writers, slow), **how)
 sys.argv = ["rotor", "spectrum", "CO", "--csv", "x.csv"]

@@ -10,7 +10,7 @@ from places import ORACLES
 
 from rotor.cli import folded
 from rotor.cli.command import refuse_overwriting
-from rotor.verbs.outputs import Files
+from rotor.verbs.common.outputs import Files
 
 CASE = ORACLES / "ocs"
 LINES = "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,{},0.01\n"

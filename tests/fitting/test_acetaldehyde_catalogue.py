@@ -10,7 +10,7 @@ import rotor
 from rotor.fitting.assignment import assignments
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
-from rotor.fitting.search import FitOptions
+from rotor.fitting.search.residuals import FitOptions
 from rotor.fitting.top_constants import TopConstants
 from rotor.tops.internal_rotation import InternalRotationConstants
 

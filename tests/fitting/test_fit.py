@@ -9,21 +9,21 @@ import pytest
 
 import rotor
 from rotor.fitting.assignment import assignments, duplicates, merged
-from rotor.fitting.choose import choose_constants, promised, suggest_lines, try_constants
-from rotor.fitting.criteria import chi_squared
+from rotor.fitting.choice.choose import choose_constants, promised, suggest_lines, try_constants
+from rotor.fitting.choice.criteria import chi_squared
 from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters, with_names
-from rotor.fitting.publication import publication_table, value_text
-from rotor.fitting.report import decisive, report_text
+from rotor.fitting.reports.publication import publication_table, value_text
+from rotor.fitting.reports.report import decisive, report_text
 from rotor.fitting.resampling import bootstrap
-from rotor.fitting.search import robust
+from rotor.fitting.search.residuals import robust
 from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.quantum.estimates.budgets import level_errors
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 ASYMMETRIC = ("j", "ka", "kc")

@@ -14,7 +14,7 @@ from rotor.fitting.assignment import assignments
 from rotor.fitting.budgets import NORMAL, confidence_text, constants_budget, predictions_budget, student_quantile
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 
 CO = Constants(B=57635.968, D=0.1835)
 

@@ -17,12 +17,12 @@ from file_covariance import constants_covariance
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.fit import fit_lines
+from rotor.fitting.levels.top_levels import top_levels
 from rotor.fitting.parameters import Parameters, parameters
-from rotor.fitting.publication import publication_table
+from rotor.fitting.reports.publication import publication_table
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.result import Fit, determined_covariance
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import top_levels
 from rotor.formats.fits.fit_request import answer_fit, lines_request, write_fitted_toml
 from rotor.formats.lines.assigned_lines import write_assigned_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
@@ -33,7 +33,7 @@ from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.estimates import contracted, effect_units
 from rotor.quantum.estimates.contracted import ContractedLevels
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top

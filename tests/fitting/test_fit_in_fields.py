@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.fitting.stark_levels import stark_levels
+from rotor.fitting.levels.stark_levels import stark_levels
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.fits.fit_request import answer_fit, lines_request
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM

@@ -7,9 +7,9 @@ from places import ORACLES
 import rotor
 from rotor.fitting.assignment import assignments, levels_in
 from rotor.fitting.fit import fit_lines
+from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import MissingLevelsError
 from rotor.tops.internal_rotation import InternalRotationConstants
 

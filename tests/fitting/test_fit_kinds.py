@@ -16,7 +16,7 @@ from fit_kinds import ERROR_MHZ, Kind, lin_text, lines_of, parameter_file, start
 from places import PROJECT
 
 from rotor.fitting.assignment import assignments, merged
-from rotor.fitting.choose import suggest_lines
+from rotor.fitting.choice.choose import suggest_lines
 from rotor.fitting.fit import fit_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fits.fit_states import FileLevels, excluded_parameters, unmeasured_lines

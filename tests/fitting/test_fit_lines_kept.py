@@ -13,13 +13,13 @@ import pytest
 
 import rotor
 from rotor.cli import run
-from rotor.fitting.publication import name_text
-from rotor.fitting.report import dfbetas, influence, report_text, statistics_text
+from rotor.fitting.reports.publication import name_text
+from rotor.fitting.reports.report import dfbetas, influence, report_text, statistics_text
 from rotor.formats.fits.fit_request import answer_fit, lines_request
 from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.plots.spectra.fit import fit_figure
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 TRUE = Constants(A=9400.0, B=3100.0, C=2500.0)

@@ -11,11 +11,11 @@ import pytest
 
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.fitting.choose import choose_constants, promised, try_constants
-from rotor.fitting.criteria import chi_squared, f_test
+from rotor.fitting.choice.choose import choose_constants, promised, try_constants
+from rotor.fitting.choice.criteria import chi_squared, f_test
 from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters, with_names
-from rotor.fitting.report import report_text
+from rotor.fitting.reports.report import report_text
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
@@ -23,7 +23,7 @@ from rotor.formats.lines.assigned_lin import as_lin, lin_notes
 from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.plots.spectra.fit import fit_figure
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 from rotor.verbs.fit import EXAMPLES
 

@@ -15,12 +15,12 @@ import pytest
 
 import rotor
 from rotor.fitting.assignment import Assignments
-from rotor.fitting.first_values import beside_zero
+from rotor.fitting.choice.orders import j_order
 from rotor.fitting.fit import fit_lines
-from rotor.fitting.orders import j_order
+from rotor.fitting.levels.top_levels import top_levels
 from rotor.fitting.parameters import parameters, with_names
+from rotor.fitting.search.first_values import beside_zero
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import top_levels
 from rotor.formats.fits.fit_request import answer_fit, lines_request
 from rotor.formats.lines.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.fits.fit_input import spfit_input
@@ -31,7 +31,7 @@ from rotor.formats.spcat.text.lin import read_lin
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top

@@ -7,9 +7,9 @@ import rotor
 from rotor import units
 from rotor.fitting.assignment import assignments, levels_in
 from rotor.fitting.fit import fit_lines
+from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import label_model
 from rotor.quantum.quanta import SPECIES_NUMBERS
 from rotor.tops.internal_rotation import InternalRotationConstants
 

@@ -10,10 +10,10 @@ from file_covariance import constants_covariance
 
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.fitting.choose import choose_constants
+from rotor.fitting.choice.choose import choose_constants
 from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
-from rotor.fitting.report import dfbetas, influential
+from rotor.fitting.reports.report import dfbetas, influential
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.result import Fit
 from rotor.formats.fits import fit_further
@@ -23,7 +23,7 @@ from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import read_par
 from rotor.spectra.lines import line_list
 from rotor.statistics.least_squares import INTERRUPTED, Iteration
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 
 TRUE = Constants(A=5213.4471, B=1897.2265, C=1401.8812, DeltaJ=2.12e-4, DeltaJK=-1.11e-3, deltaJ=5.1e-5, deltaK=9.3e-4)
 HEAD = "j_upper,ka_upper,kc_upper,j_lower,ka_lower,kc_lower,frequency_mhz,error_mhz\n"
@@ -70,7 +70,7 @@ def test_an_interrupt_ends_every_way_of_the_search(seen):
 
 
 def test_an_interrupt_of_many_fits_leaves_what_is_done(seen, monkeypatch):
-    import rotor.fitting.choose as choose
+    import rotor.fitting.choice.choose as choose
     import rotor.fitting.resampling as resampling
 
     fit = fit_lines(seen, TRUE, parameters(TRUE, ["A", "B", "C", "DeltaJ"]))

@@ -7,9 +7,9 @@ from spherical_tensors import spherical, symbol
 import rotor
 from rotor.fitting.assignment import assignments
 from rotor.fitting.fit import fit_lines
+from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import label_model
 from rotor.formats.lines.assigned_lines import write_assigned_lines
 from rotor.tops.internal_rotation import InternalRotationConstants
 

@@ -4,8 +4,8 @@ import numpy as np
 from places import ORACLES
 
 import rotor
+from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import label_model
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM

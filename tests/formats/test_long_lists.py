@@ -17,7 +17,7 @@ import pytest
 from rotor.formats.lines import line_tables
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import parse_scene
-from rotor.verbs import long_lists
+from rotor.verbs.common import long_lists
 
 CONSTANTS = "A=8572 B=3640 C=2790 MHz"
 TYPED = (

@@ -19,7 +19,7 @@ from places import PROJECT
 import rotor
 from rotor.formats.lines.streamed_lines import stream_lines
 from rotor.formats.spcat.text.cat import read_cat
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 PROPANEDIOL = Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.2, 1.9, 0.4))

@@ -8,7 +8,7 @@ from places import SHARED
 
 import rotor
 from rotor.fitting.assignment import levels_in
-from rotor.fitting.top_levels import label_model
+from rotor.fitting.levels.top_levels import label_model
 from rotor.formats.fits.fit_request import constants_for
 from rotor.formats.lines.assigned_lines import read_assigned_lines
 

@@ -7,8 +7,8 @@ import pytest
 from places import ORACLES
 
 import rotor
+from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import label_model
 
 # constants of kncrabtree/blackchirp @71a1a6e, tests/testdata/test_aprint32_small.xi (MTBE), its layout
 INPUT = """mtbe

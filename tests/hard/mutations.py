@@ -99,7 +99,7 @@ MUTATIONS = (
         "tests/quantum/estimates/test_conversions.py::test_left_handed_axes_change_signs_alone",
     ),
     Mutation(
-        6, "rotor/tops/kind_of_constants.py",
+        6, "rotor/tops/constants/kind_of_constants.py",
         '    if rigid == "AB" or (rigid == "ABC" and values["B"] == values["C"]):\n        return "prolate"',
         '    if rigid == "AB" or (rigid == "ABC" and abs(values["B"] / values["C"] - 1) < 1e-5):\n        return "prolate"',
         "tests/hard/test_safeguards.py::test_the_doublet_of_a_near_symmetric_top_is_there",
@@ -187,7 +187,7 @@ MUTATIONS = (
         "tests/requests/test_requests.py::test_levels_count_from_the_lowest_that_exists",
     ),
     Mutation(
-        21, "rotor/spectra/transitions.py",
+        21, "rotor/spectra/transitions/pairs.py",
         "        keep &= (levels.weight[lower] > 0) & (levels.weight[upper] > 0)\n", "",
         "tests/quantum/test_safeguards.py::test_levels_that_do_not_exist_make_no_lines_in_closed_form",
     ),
@@ -280,7 +280,7 @@ MUTATIONS = (
         "tests/alignment/test_alignment.py::test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough",
     ),
     Mutation(
-        24, "rotor/alignment/steps.py",
+        24, "rotor/alignment/propagation/steps.py",
         "        if error <= goal:\n", "        if True:\n",
         "tests/hard/test_safeguards.py::test_the_steps_of_a_pulse_are_halved_until_they_agree",
     ),

@@ -16,7 +16,7 @@ from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.solve import solve_levels
 from rotor.requests.budget import ROUNDING
 from rotor.thermodynamics.functions import thermodynamic_functions
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_K
 

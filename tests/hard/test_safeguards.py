@@ -9,8 +9,8 @@ import pytest
 from slow_matrix import watson_matrix
 
 from rotor.alignment.align import align
+from rotor.alignment.propagation.steps import FIRST_STEPS
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, GaussianPulse
-from rotor.alignment.steps import FIRST_STEPS
 from rotor.classical.lyapunov import body_flow, lyapunov_exponents
 from rotor.fluids.motion.thermometers import Kinetic, temperatures
 from rotor.molecules.molecule import Molecule
@@ -20,7 +20,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.statistics.degrees_of_freedom import Degrees
 from rotor.structures.family import family
 from rotor.structures.least_squares import fit_structure
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 WATER_QUARTIC = {

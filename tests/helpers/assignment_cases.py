@@ -6,7 +6,7 @@ import numpy as np
 
 import rotor
 from rotor.assignment.answer import AssignAnswer
-from rotor.assignment.peaks import PeakList, peak_list
+from rotor.assignment.peaks.peak_list import PeakList, peak_list
 
 BAND = (8000.0, 18000.0)
 

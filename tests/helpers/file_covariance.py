@@ -7,7 +7,7 @@ import numpy as np
 from rotor.formats.spcat.hamiltonian.codes import constants_and_matrix
 from rotor.formats.spcat.solved_groups import variance_factor
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.covariance import Covariance
 
 
 def constants_covariance(file: ParameterFile) -> Covariance | None:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor import units
-from rotor.observed.model import Component, Sight, model
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import SpeciesLines, species_lines, strength_from_einstein
+from rotor.observed.model.model import Component, Sight, model
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import SpeciesLines, species_lines, strength_from_einstein
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
 
 EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D²

@@ -24,7 +24,7 @@ from rotor.formats.spcat.predict import Prediction, predict_file
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.spectra.lines import Lines, line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 

@@ -198,8 +198,8 @@ def torsion(seed: int) -> Case:
 
 def emission(seed: int) -> Case:
     """Brightness at the brightest line of CO or of a random top, against lines of any optical depth."""
-    from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
-    from rotor.spectra.emitters import WEAKEST
+    from rotor.spectra.emission.emitters import WEAKEST
+    from rotor.spectra.emission.request import EmissionRequest, Source, answer_emission
 
     rng = rng_of(9, seed)
     top = random_top(rng, linear=0.5)
@@ -217,7 +217,7 @@ def emission(seed: int) -> Case:
 
 def contrast(answer) -> float:
     """Brightness of an opaque layer at the frequency of the error budget, K."""
-    from rotor.spectra.emission import contrast_k
+    from rotor.spectra.emission.emission import contrast_k
 
     request = answer.request
     frequency = np.mean(request.range_mhz) if answer.peak is None else answer.peak.observed_mhz
@@ -244,7 +244,7 @@ def fitted(seed: int) -> Case:
 def fit_problem(rng: np.random.Generator):
     """Lines of J up to 8 of a top with distortion, with noise of 10 kHz to 1 MHz; constants that are off by a percent; names to fit."""
     from rotor.fitting.assignment import assignments
-    from rotor.tops.constants import Constants
+    from rotor.tops.constants.constants import Constants
 
     c = rng.uniform(1e3, 5e3)
     b = c * rng.uniform(1.05, 1.6)

@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 DRAWS, CONFIDENCE, DEVIATIONS = 300, 0.95, 1.96

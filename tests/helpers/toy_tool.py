@@ -9,8 +9,8 @@ from typing import Any
 from rotor.checks import NoAnswerError
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Text, Whole
-from rotor.verbs.outputs import Output
-from rotor.verbs.verb import Tool
+from rotor.verbs.common.outputs import Output
+from rotor.verbs.common.verb import Tool
 
 
 @dataclass(frozen=True)

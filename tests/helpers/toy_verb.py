@@ -12,9 +12,9 @@ from rotor.requests.field import check_fields, declared
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Grid, Quantity, Text, Whole
 from rotor.table import Table
-from rotor.verbs.outputs import Output
-from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Verb
+from rotor.verbs.common.outputs import Output
+from rotor.verbs.common.subjects import OneMolecule
+from rotor.verbs.common.verb import Verb
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.molecules.molecule_writer import write_molecule_file
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 TRUE = Constants(A=9000.0, B=3000.0, C=2400.0, DeltaJ=0.001, DeltaJK=0.002, DeltaK=0.01, deltaJ=0.0001, deltaK=0.001)

@@ -12,7 +12,7 @@ from rotor.geometry.inertia import point_masses
 from rotor.molecules.force_field import ForceField, force_field_from_internal
 from rotor.molecules.internal_coordinates import linear_bend, stretch
 from rotor.molecules.molecule import Molecule
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.distortion import MHZ_PER_EV, distortion_constants, quartic_tensor_mhz, semirigid_top, tau_mhz
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 

@@ -7,8 +7,8 @@ import pytest
 from observed_cases import artificial, injected, rigid
 
 from rotor.observed.fit import FitChoices, column_limit, contributions, fit_source
-from rotor.observed.model import Component, Sight, model
-from rotor.observed.partition import PartitionTable
+from rotor.observed.model.model import Component, Sight, model
+from rotor.observed.model.partition import PartitionTable
 from rotor.observed.spectrum import observed_spectrum
 from rotor.observed.start import start_components, velocity_and_width
 

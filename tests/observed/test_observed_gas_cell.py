@@ -8,7 +8,7 @@ from observed_cases import artificial, rigid
 
 from rotor.observed.fit import contributions
 from rotor.observed.gas_cell import absorbance, fit_cell, start_cell
-from rotor.observed.model import Component
+from rotor.observed.model.model import Component
 from rotor.observed.spectrum import observed_spectrum
 
 GRID = np.concatenate([np.arange(f - 3, f + 3, 0.02) for f in 20e3 * np.arange(1, 9)])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from observed_cases import artificial, injected
 
-from rotor.observed.identify import identify
-from rotor.observed.model import Component
-from rotor.observed.selection import IdentifyChoices
+from rotor.observed.identification.identify import identify
+from rotor.observed.identification.selection import IdentifyChoices
+from rotor.observed.model.model import Component
 from rotor.observed.spectrum import observed_spectrum
 from rotor.observed.start import velocity_and_width
 

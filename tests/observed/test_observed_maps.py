@@ -9,7 +9,7 @@ from observed_cases import artificial, injected, rigid
 from rotor.observed.cube import fit_cube
 from rotor.observed.diagram import rotational_diagram
 from rotor.observed.fit import FitChoices, fit_source
-from rotor.observed.model import Component, Sight, model
+from rotor.observed.model.model import Component, Sight, model
 from rotor.observed.spectrum import observed_spectrum
 
 GRID = np.concatenate([np.arange(f - 10, f + 10, 0.05) for f in (20e3, 40e3, 60e3, 80e3, 100e3)])

@@ -1,4 +1,4 @@
-"""LTE models of observed spectra: limits in closed form, derivatives, and agreement with `rotor.spectra.emission`."""
+"""LTE models of observed spectra: limits in closed form, derivatives, and agreement with `rotor.spectra.emission.emission`."""
 
 import math
 
@@ -7,14 +7,14 @@ import pytest
 from observed_cases import rigid
 
 from rotor import units
-from rotor.observed.model import KM_PER_S, PARAMETERS, Component, Dust, Sight, escape, model, planck_slope
-from rotor.observed.partition import PartitionTable, top_partition
-from rotor.observed.species import (
+from rotor.observed.model.model import KM_PER_S, PARAMETERS, Component, Dust, Sight, escape, model, planck_slope
+from rotor.observed.model.partition import PartitionTable, top_partition
+from rotor.observed.model.species import (
     species_from_lines,
     strength_from_einstein,
     strength_from_lgint,
 )
-from rotor.spectra.emission import Source, emission, planck_k
+from rotor.spectra.emission.emission import Source, emission, planck_k
 from rotor.spectra.lines import line_list
 from rotor.tops.top import Top
 

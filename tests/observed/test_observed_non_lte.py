@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from rotor import units
-from rotor.observed.model import Component, Sight, model
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import species_lines, strength_from_einstein
+from rotor.observed.model.model import Component, Sight, model
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import species_lines, strength_from_einstein
 from rotor.observed.spectrum import observed_spectrum
 
 pytest.importorskip("pythonradex")
 
-from rotor.observed.non_lte import NonLteComponent, excited_lines, fit_non_lte, non_lte_brightness
+from rotor.observed.model.non_lte import NonLteComponent, excited_lines, fit_non_lte, non_lte_brightness
 
 B_CM = 1.9225
 J = np.arange(12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from observed_cases import injected, rigid
 
-from rotor.observed.model import Component
+from rotor.observed.model.model import Component
 from rotor.observed.spectrum import (
     in_kelvin,
     kelvin_per_jansky,

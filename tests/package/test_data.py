@@ -18,7 +18,7 @@ from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_fi
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.molecules.symmetry.point_group import molecule_symmetry
 from rotor.quantum.solve import solve_levels
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.covariance import Covariance
 from rotor.tops.spins.spin_statistics import statistical_weights
 from rotor.tops.top import SYMMETRIC_WITHIN, Top
 from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2

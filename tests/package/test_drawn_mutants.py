@@ -188,7 +188,7 @@ def test_moments_by_time_need_rising_times(times):
 def test_lines_that_no_dipole_makes_are_named_and_others_are_not():
     """Moments along a, b and c change Kc, both, or Ka by odd numbers (1_01, 1_11 and 1_10 from 0_00), and J by 0 or 1."""
     from rotor.fitting.assignment import assignments
-    from rotor.fitting.fit_notes import unlikely_lines
+    from rotor.fitting.reports.fit_notes import unlikely_lines
 
     def said(upper, lower):
         return unlikely_lines(assignments(("j", "ka", "kc"), [upper], [lower], [1e4], 0.1))
@@ -240,7 +240,7 @@ def test_a_sum_of_cosines_at_even_times_is_the_plain_sum_without_its_exponential
 
 def test_lines_that_stand_twice_are_named_with_how_far_they_are_apart():
     from rotor.fitting.assignment import assignments
-    from rotor.fitting.fit_notes import repeated_text
+    from rotor.fitting.reports.fit_notes import repeated_text
 
     lines = assignments(("j",), [[1], [2], [1], [2]], [[0], [1], [0], [1]], [100.0, 200.0, 100.25, 200.5], 0.1)
     assert "the largest difference is 0.5 MHz, of 2 - 1" in repeated_text(lines, [(0, 2), (1, 3)])
@@ -372,7 +372,7 @@ def test_the_steps_are_chosen_by_the_block_with_the_largest_population(monkeypat
     """What hardly any molecule is in says little about the steps that the cosines need."""
     from types import SimpleNamespace
 
-    from rotor.alignment import steps
+    from rotor.alignment.propagation import steps
 
     weights = {"even": [0.1, 0.05], "odd": [0.5, 0.2], "none": None, "rest": [0.15]}
     tasks = {
@@ -389,7 +389,7 @@ def test_the_steps_are_chosen_by_the_block_with_the_largest_population(monkeypat
 
 def test_a_line_is_seen_above_the_noise_and_above_half_its_height():
     """Of three expected lines of 10, 10 and 4 σ the spectrum shows 8, 4 (less than half) and 2.5 σ (in the noise)."""
-    from rotor.observed.identify import _lines_seen
+    from rotor.observed.identification.identify import _lines_seen
     from rotor.observed.spectrum import ObservedSpectrum
 
     expected, shown = np.zeros(40), np.zeros(40)
@@ -427,7 +427,7 @@ def test_a_fit_tries_another_way_while_it_may(status, iterations, goes_on):
     """Neither after Ctrl-C nor when its iterations are over."""
     from types import SimpleNamespace
 
-    from rotor.fitting import strategies
+    from rotor.fitting.search import strategies
 
     search = SimpleNamespace(options=SimpleNamespace(most_iterations=20))
     reached = {"stalled": strategies.STALLED, "interrupted": strategies.INTERRUPTED}[status]

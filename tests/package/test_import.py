@@ -91,8 +91,9 @@ def test_a_short_command_loads_nothing_heavy(folder, words):
 
 
 NOT_FOR_HELP = (
-    "rotor.spectra.lines", "rotor.fitting.fit", "rotor.fitting.publication", "rotor.formats.fits.fit_request", "rotor.assignment.answer",
-    "rotor.assignment.rigid_table", "rotor.formats.catalogue.cat_species", "rotor.alignment.acting", "rotor.alignment.align",
+    "rotor.spectra.lines", "rotor.fitting.fit", "rotor.fitting.reports.publication", "rotor.formats.fits.fit_request",
+    "rotor.assignment.answer",
+    "rotor.assignment.search.rigid_table", "rotor.formats.catalogue.cat_species", "rotor.alignment.acting", "rotor.alignment.align",
     "rotor.classical.euler", "rotor.classical.free.free_motion", "rotor.classical.integrators.method", "rotor.quantum.levels",
     "rotor.formats.fits.family_file", "rotor.structures.least_squares",
 )  # fmt: skip

@@ -15,7 +15,8 @@ FAMILIES = (
     "rotor.quantum.spins", "rotor.quantum.fields", "rotor.quantum.internal_rotation",
     "rotor.quantum.effects.spin_effect", "rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman",
     "rotor.quantum.effects.interactions",
-    "rotor.spectra", "rotor.spectra.raman", "rotor.spectra.emission", "rotor.spectra.fields", "rotor.thermodynamics.functions",
+    "rotor.spectra", "rotor.spectra.raman.raman", "rotor.spectra.emission.emission", "rotor.spectra.fields",
+    "rotor.thermodynamics.functions",
     "matplotlib", "ase", "rdkit", "qutip", "numba", "duckdb", "pandas", "polars", "openmm", "dask",
 )  # fmt: skip
 SPINS_NAMED = {
@@ -27,7 +28,7 @@ LOADED = {  # of FAMILIES, what a kind has a use for
     "info": set(),
     "isotopologues": set(),
     "levels": set(),
-    "raman": {"rotor.spectra", "rotor.spectra.raman"},
+    "raman": {"rotor.spectra", "rotor.spectra.raman.raman"},
     "stark": {"rotor.spectra", "rotor.spectra.fields", "rotor.quantum.effects.stark", "rotor.quantum.fields"},
     "zeeman": {"rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman", "rotor.quantum.fields"},
     "thermo": {"rotor.thermodynamics.functions"},
@@ -36,7 +37,7 @@ LOADED = {  # of FAMILIES, what a kind has a use for
     "torsion": {"rotor.thermodynamics.functions", "ase"},  # which reads the molecule
     "gas": {"rotor.classical", "rotor.classical.gas", "numba"},
     "align": {"rotor.alignment", "rotor.quantum.fields", "numba"},
-    "emission": {"rotor.spectra", "rotor.spectra.emission"},
+    "emission": {"rotor.spectra", "rotor.spectra.emission.emission"},
     "fit": {"rotor.fitting", "rotor.spectra", "rotor.quantum.effects.interactions", *SPINS_NAMED},
     "fluid": {"rotor.fluids", "rotor.classical", "rotor.classical.gas", "ase", "numba"},
     "assign": {"rotor.assignment", "rotor.observed", "rotor.fitting", "rotor.spectra", "rotor.quantum.effects.interactions", "numba"}

@@ -9,7 +9,7 @@ from rotor.quantum.estimates.convergence import RATIO_LIMIT, order_sizes_mhz, se
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 WATER_QUARTIC = Constants(

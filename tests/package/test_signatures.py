@@ -31,7 +31,7 @@ for vector in (down, still, np.arange(9.0)[::3], [0, 0, -1]):
     for attitude in (turned, fixed):
         from_body(vector, attitude), lever_torque(vector, still, attitude)
 assert turned_axes(np.array([[1.0, 0.8, 0.3], [0.3, 0.8, 1.0]])).flags.c_contiguous
-modules = ("rotor.assignment._kernels", "rotor.assignment._sweep", "rotor.classical.integrators._attitude_kernels")
+modules = ("rotor.assignment.search._kernels", "rotor.assignment.search._sweep", "rotor.classical.integrators._attitude_kernels")
 numbers = {}
 for module in map(import_module, modules):
     for name, value in vars(module).items():

@@ -12,14 +12,14 @@ import rotor
 from rotor.classical.driven import DrivenRequest
 from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.classical.lyapunov import Flow, lyapunov_exponents
-from rotor.fitting.publication import suitable_unit, value_text
+from rotor.fitting.reports.publication import suitable_unit, value_text
 from rotor.formats.spcat.hamiltonian.labels import Functions, _by_k2
 from rotor.plots.show import write_picture
 from rotor.plots.spectra.raman import picture as raman_picture
 from rotor.plots.view import View
 from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.wang_matrix import lowest_energies
-from rotor.spectra.raman import raman_lines
+from rotor.spectra.raman.raman import raman_lines
 from rotor.tops.spins.spin_weights import MOST_WEIGHT, SpinWeights
 
 # Blocks of three bands

@@ -9,7 +9,7 @@ from matplotlib.image import imread
 from places import PROJECT
 
 import rotor
-from rotor.observed.model import Sight
+from rotor.observed.model.model import Sight
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.plots.spectra.overlay import overlay_figure
 from rotor.plots.work_precision import Panel, Point, work_precision_figure

@@ -10,7 +10,7 @@ import pytest
 
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 A, B, C, J = 1000.0, 500.0, 499.9, 1000

@@ -6,7 +6,7 @@ import pytest
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.labelled import level_model
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 A_TERMS = {"DeltaJ": 1e-3, "DeltaJK": 2e-3, "DeltaK": 1e-3, "deltaJ": 3e-4, "deltaK": 5e-4, "PhiK": 1e-8, "phiK": 1e-8,

@@ -10,7 +10,7 @@ import pytest
 from rotor.quantum.estimates.convergence import disordered_blocks
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.basis import wang_blocks
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 

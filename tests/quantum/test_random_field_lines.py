@@ -14,7 +14,7 @@ from random_hamiltonians import LARGEST, NUCLEAR_G, Case, full_matrix, functions
 from random_tops import top_and_effects
 
 import rotor
-from rotor.fitting.stark_levels import stark_levels
+from rotor.fitting.levels.stark_levels import stark_levels
 from rotor.fitting.top_constants import TopConstants
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.zeeman import zeeman_map

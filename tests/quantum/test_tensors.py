@@ -31,7 +31,7 @@ from rotor.quantum.tensors import (
 )
 from rotor.quantum.wang.basis import REPRESENTATIONS, WangBlock, wang_blocks
 from rotor.quantum.wigner import three_j
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 JMAX = 8

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from slow_matrix import AXES, watson_matrix
 
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 RIGID = {"A": 9000.0, "B": 5000.0, "C": 3000.0}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import rotor
-from rotor.tops.uncertain_numbers import known_digits
+from rotor.tops.constants.uncertain_numbers import known_digits
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ from rotor.scenes.run import run_scene
 from rotor.scenes.scene import parse_scene, scene_text
 from rotor.scenes.template import template
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 OTHERWISE = (
     "align",
@@ -208,7 +208,7 @@ def test_a_default_as_it_is_shown_is_the_default(kind):
 
 
 def _place():
-    from rotor.verbs.verb import Place
+    from rotor.verbs.common.verb import Place
 
     return Place()
 
@@ -304,7 +304,7 @@ def test_files_of_spcat_are_no_scene(call):
 )
 def test_an_error_names_fields_in_the_style_of_the_user(style, text):
     from rotor.requests.fill import NamedError, naming
-    from rotor.verbs.turning_body import MOTION
+    from rotor.verbs.common.turning_body import MOTION
 
     with pytest.raises(ValueError) as error, naming(MOTION.values(), style):
         raise NamedError("{numerics.step}: expected with {effects}, not '{other}'")
@@ -325,7 +325,7 @@ def test_an_error_names_fields_in_the_style_of_the_user(style, text):
 )
 def test_plain_names_in_an_error_are_replaced(text, said):
     from rotor.requests.fill import naming
-    from rotor.verbs.turning_body import MOTION
+    from rotor.verbs.common.turning_body import MOTION
 
     with pytest.raises(ValueError) as error, naming(MOTION.values(), "option"):
         raise ValueError(text)
@@ -348,7 +348,7 @@ def test_plain_names_in_an_error_are_replaced(text, said):
 def test_rules_of_fields_and_files(style, given, text):
     from rotor.requests.fill import refuse_misfits
     from rotor.requests.readers import Field, Rule
-    from rotor.verbs.outputs import Output
+    from rotor.verbs.common.outputs import Output
 
     fields = (
         Field(Text(), "", "a.light", name="light", rule=Rule(("outputs.lines",), why="changes a file alone")),

@@ -17,7 +17,7 @@ from rotor.fluids.settings import Settings
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.reports.screen import plain, table_records
 from rotor.requests.readers import Whole
-from rotor.spectra.raman_request import RamanRequest, answer_raman
+from rotor.spectra.raman.request import RamanRequest, answer_raman
 from rotor.spectra.request import GasLayer, SpectrumRequest, answer_spectrum
 from rotor.thermodynamics.gas.classical_gas import GasRequest, answer_gas, settling_times_ps
 from rotor.thermodynamics.gas.thermal_tumble import thermal_tumble

@@ -66,7 +66,7 @@ def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accurac
     from dataclasses import replace
 
     from rotor.scenes.run import run_scene
-    from rotor.verbs.verb import Work, verb_of
+    from rotor.verbs.common.verb import Work, verb_of
 
     result = run_scene(parse_scene(HEAD.format(kind, accuracy) + body))
     name, column = {
@@ -102,7 +102,7 @@ def test_a_decade_coarser_misses(folder):
     from dataclasses import replace
 
     from rotor.formats.fits.fit_request import answer_fit
-    from rotor.spectra.emission_request import answer_emission
+    from rotor.spectra.emission.request import answer_emission
 
     def taken(kind, accuracy, body):
         scene = parse_scene(HEAD.format(kind, accuracy) + body)

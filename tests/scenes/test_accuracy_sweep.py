@@ -25,7 +25,7 @@ from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, panels_of, sweep, sweeps_of, work_precision
 from rotor.scenes.scene import make_scene, write_scene
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 
 def errors(table: WorkPrecision, knob: str, of: str | None = None) -> dict[str, float]:

@@ -19,10 +19,10 @@ from rotor.quantum.estimates.budgets import model_term
 from rotor.quantum.estimates.splittings import line_components
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
-from rotor.spectra.brightness_budget import steepness
+from rotor.spectra.emission.budget import steepness
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
@@ -273,7 +273,7 @@ def test_the_slope_of_a_line_is_bounded():
 
 def test_brightness_moves_as_its_budget_says():
     """A line whose frequency is off by a tenth of its width, seen at one frequency, against the shift that the budget allows."""
-    from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
+    from rotor.spectra.emission.request import EmissionRequest, Source, answer_emission
 
     def answer(b):
         co = Top.from_constants(f"B={b} MHz", dipole_abc_debye=(0.11011, 0, 0), name="CO")
@@ -301,8 +301,8 @@ def test_brightness_moves_as_its_budget_says():
 )
 def test_a_quadrupole_that_is_left_out_takes_brightness_from_the_centre(name, range_mhz, width):
     """At the centre of the brightest line, against the whole calculation with spins: the size holds within a factor of 1.5."""
-    from rotor.spectra.emission import emission
-    from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
+    from rotor.spectra.emission.emission import emission
+    from rotor.spectra.emission.request import EmissionRequest, Source, answer_emission
 
     source, top = Source(1e14, 20.0, width), rotor.read(name)
     answer = answer_emission(EmissionRequest((top,), (source,), range_mhz))
@@ -315,7 +315,7 @@ def test_a_quadrupole_that_is_left_out_takes_brightness_from_the_centre(name, ra
 
 def test_the_quadrupole_of_a_line_of_high_j_is_inside_its_width():
     """HC3N 10 - 9 at 1 km/s: its strong components are 0.02 MHz apart, the width is 0.3 MHz."""
-    from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
+    from rotor.spectra.emission.request import EmissionRequest, Source, answer_emission
 
     answer = answer_emission(EmissionRequest((rotor.read("HC3N"),), (Source(1e14, 100.0, 1.0),), (80e3, 100e3)))
     assert answer.errors.model.value < 0.05 * answer.peak.brightness_k

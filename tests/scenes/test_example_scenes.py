@@ -14,7 +14,7 @@ import rotor
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import read_scene
 from rotor.scenes.sweep import SweepResult, run_sweep
-from rotor.verbs.calculation import Outcome
+from rotor.verbs.common.calculation import Outcome
 
 FOLDER = PROJECT / "examples" / "scenes"
 

@@ -19,7 +19,7 @@ from rotor.scenes.schema import json_schema, table_schema
 from rotor.scenes.sweep.points import points
 from rotor.scenes.template import template
 from rotor.verbs import SCENE_VERBS
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 HEAD = 'schema = 1\nkind = "spectrum"\nmolecule = "water"\n'
 

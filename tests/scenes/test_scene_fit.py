@@ -13,7 +13,7 @@ from rotor.scenes.accuracy_sweep import work_precision
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import make_scene, parse_scene, read_scene, write_scene
-from rotor.verbs.calculation import NoResultError
+from rotor.verbs.common.calculation import NoResultError
 
 DATA = ORACLES / "fits"
 OCS = ("--constants", "B=6081 D=0.001 H=0 MHz")

@@ -23,7 +23,7 @@ from rotor.spectra.spectrum import Spectrum
 from rotor.spectra.widths import doppler
 from rotor.thermodynamics.gas.numerics import neglected_in_gas
 from rotor.thermodynamics.sums.classical_limit import classical_partition_function, populated_j
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 
 FOLDER = PROJECT / "examples" / "scenes"

@@ -20,7 +20,7 @@ from rotor.quantum.effects.watson import Rigid
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import make_scene, parse_scene, read_scene, write_scene
 from rotor.scenes.sweep import points, run_sweep
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 WATER_XYZ = "3\nwater\nO 0 0 0.1173\nH 0 0.7572 -0.4692\nH 0 -0.7572 -0.4692\n"
 

@@ -9,7 +9,7 @@ import pytest
 from scipy import constants as si
 
 import rotor
-from rotor.spectra.emission import (
+from rotor.spectra.emission.emission import (
     BACKGROUND_K,
     Source,
     band_mhz,
@@ -167,7 +167,7 @@ def test_a_library_molecule_in_a_band():
 
 def test_a_line_beyond_the_edge_shows_its_wing():
     """A range that begins one half width above the centre of CO 1-0, against a range that holds the line."""
-    from rotor.spectra.emission_request import EmissionRequest, answer_emission
+    from rotor.spectra.emission.request import EmissionRequest, answer_emission
 
     source, half = Source(1e16, 20.0, 10.0), 115271.2 * 5.0 / 299792.458
     edge = 115271.2021 + half

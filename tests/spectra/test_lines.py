@@ -12,11 +12,11 @@ from rotor import units
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.tensors import body_tensor
-from rotor.spectra import transitions
 from rotor.spectra.intensity import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
-from rotor.tops.operators import REPRESENTATIONS
+from rotor.spectra.transitions import pairs as transitions
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.operators import REPRESENTATIONS
 from rotor.tops.top import Top
 
 ABC = "A=8572 B=3640 C=2790 MHz"

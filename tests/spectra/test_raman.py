@@ -17,10 +17,10 @@ from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import body_tensor
-from rotor.spectra.raman import anisotropy_angstrom3, band_cross_section, jmax_for_raman, raman_lines
-from rotor.spectra.raman_strengths import anisotropy_squared, raman_transitions
-from rotor.tops.constants import Constants
-from rotor.tops.operators import REPRESENTATIONS
+from rotor.spectra.raman.raman import anisotropy_angstrom3, band_cross_section, jmax_for_raman, raman_lines
+from rotor.spectra.raman.strengths import anisotropy_squared, raman_transitions
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.operators import REPRESENTATIONS
 from rotor.tops.top import Top
 
 ROD = ((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5))

@@ -12,9 +12,9 @@ from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
-from rotor.spectra.raman import RamanLines, raman_lines
-from rotor.spectra.raman_request import RamanRequest, answer_raman
-from rotor.spectra.raman_strengths import raman_transitions
+from rotor.spectra.raman.raman import RamanLines, raman_lines
+from rotor.spectra.raman.request import RamanRequest, answer_raman
+from rotor.spectra.raman.strengths import raman_transitions
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 

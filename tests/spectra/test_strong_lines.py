@@ -9,9 +9,10 @@ from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.stacked_blocks import Vector, are_whole, stacked
 from rotor.quantum.tensors import body_tensor
-from rotor.spectra import strong_lines, transitions
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import Lines, line_list
+from rotor.spectra.transitions import pairs as transitions
+from rotor.spectra.transitions import strong_lines
 from rotor.thermodynamics.sums.partition import PartitionFunction
 from rotor.tops.top import Top
 

@@ -16,8 +16,8 @@ from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.estimates.budgets import level_errors
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.covariance import Covariance
 from rotor.tops.top import Top
 
 OCS = Constants(B=6081.492, D=1.3e-3, uncertainties={"B": 6e-6, "D": 2e-8})

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import rotor
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.spectra.lines import line_list
-from rotor.spectra.raman import raman_lines
+from rotor.spectra.raman.raman import raman_lines
 from rotor.thermodynamics.sums.partition import partition_function
 from rotor.thermodynamics.vibration import VibrationalStates, vibrational_partition_function
 

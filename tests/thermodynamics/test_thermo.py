@@ -18,7 +18,7 @@ from rotor.thermodynamics.sums.level_sums import level_sums
 from rotor.thermodynamics.sums.partition import partition_function
 from rotor.thermodynamics.sums.trusted_levels import trusted_energies_mhz
 from rotor.thermodynamics.vibration import vibrational_partition_function
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 

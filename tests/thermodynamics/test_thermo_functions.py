@@ -20,7 +20,7 @@ from rotor.thermodynamics.sums.level_sums import level_sums
 from rotor.thermodynamics.sums.partition import partition_function
 from rotor.thermodynamics.sums.species import implied_symmetry_number, spin_species
 from rotor.thermodynamics.vibration import VibrationalStates, vibrational_functions
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotor.tops.constants import Constants
-from rotor.tops.kind_of_constants import A_REDUCTION, S_REDUCTION, ray_kappa, vocabulary
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.kind_of_constants import A_REDUCTION, S_REDUCTION, ray_kappa, vocabulary
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.states.state_texts import parse_weights

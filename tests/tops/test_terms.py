@@ -14,8 +14,8 @@ from rotor.formats.molecules.molecule_file import MoleculeFile, parse_molecule_f
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants
-from rotor.tops.operators import published_name, spelled_powers, spelled_term
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.operators import published_name, spelled_powers, spelled_term
 from rotor.tops.top import Top
 
 RIGID = {"A": 9000.0, "B": 5000.0, "C": 3000.0}

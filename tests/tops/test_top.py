@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import rotor
 from rotor import units
 from rotor.molecules.molecule import Molecule
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.kind import kind_from_moments
 from rotor.tops.top import Top
 

@@ -15,10 +15,10 @@ import rotor
 from rotor import api
 from rotor.alignment.pulse import Kick
 from rotor.calls import EXAMPLES
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
-from rotor.verbs.verb import verb_of
+from rotor.verbs.common.verb import verb_of
 
 
 def test_the_face_is_small():

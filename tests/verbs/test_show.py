@@ -17,8 +17,8 @@ import rotor
 from rotor.classical.tumble import TumbleRequest
 from rotor.plots.show import MODULES
 from rotor.plots.spectra.spectrum import spectrum_figure
-from rotor.spectra.emission import Source
-from rotor.spectra.emission_request import EmissionRequest
+from rotor.spectra.emission.emission import Source
+from rotor.spectra.emission.request import EmissionRequest
 from rotor.spectra.spectrum import resolving_grid
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 from view_cases import KELVIN, NAME, SERIES, assign_line, write_case
 
-from rotor.viewer.joint_fits import shared_blends, together
+from rotor.viewer.actions.joint_fits import shared_blends, together
 from rotor.viewer.opening import open_session
 from rotor.viewer.prediction import changed
 from rotor.viewer.records import Line, State

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, STEP, TRUE, WIDTH, assign_line, true_lines, write_case
 
-from rotor.viewer.actions import ACTIONS
-from rotor.viewer.fits import fit_assignments
+from rotor.viewer.actions.actions import ACTIONS
+from rotor.viewer.actions.fits import fit_assignments
+from rotor.viewer.actions.peak_fit import fit_peak
 from rotor.viewer.opening import open_session
-from rotor.viewer.peak_fit import fit_peak
 from rotor.viewer.pyramid import pyramid
 from rotor.viewer.records import Line
 from rotor.viewer.session import SUFFIX, read_session
@@ -634,7 +634,7 @@ def test_combination_differences_close(service):
 
 
 def test_emission_is_the_model_of_the_library(service):
-    from rotor.observed.model import Component, Sight, model
+    from rotor.observed.model.model import Component, Sight, model
 
     done(service, "settings", emission=True)
     done(service, "species", species=1, column_per_cm2=1e13, temperature_k=5.0, fwhm_km_s=2.0, velocity_km_s=1.0)

@@ -23,7 +23,7 @@ from rotor.formats.catalogue.cat_species import read_cat_species
 from rotor.formats.catalogue.catdir import CatdirEntry, catdir_beside, is_catdir, read_catdir
 from rotor.formats.catalogue.database import MEMORY_MB, connect, new_catalogue, scalar
 from rotor.formats.catalogue.names import hill_formula
-from rotor.observed.species import SpeciesLines
+from rotor.observed.model.species import SpeciesLines
 
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
@@ -171,7 +171,7 @@ def _library() -> Iterator[tuple[str, Callable[[], Batch]]]:
 
 def _library_batch(name: str) -> Batch:
     from rotor.formats.read_write import read
-    from rotor.observed.species import species_from_lines
+    from rotor.observed.model.species import species_from_lines
     from rotor.spectra.lines import line_list
 
     top = read(name)

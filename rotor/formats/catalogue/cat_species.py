@@ -20,8 +20,8 @@ from rotor.formats.spcat.compare import in_mhz
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import CATALOGUE_K, SpeciesLines, species_lines, strength_from_lgint
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import CATALOGUE_K, SpeciesLines, species_lines, strength_from_lgint
 
 NO_CATDIR = "there is no catdir.cat with this tag"
 

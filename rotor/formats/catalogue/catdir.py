@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor.formats.packed import load
-from rotor.observed.partition import PartitionTable
+from rotor.observed.model.partition import PartitionTable
 
 CDMS_K = (1000.0, 500.0, 300.0, 225.0, 150.0, 75.0, 37.5, 18.75, 9.375, 5.0, 2.725)
 JPL_K = (300.0, 225.0, 150.0, 75.0, 37.5, 18.75, 9.375)

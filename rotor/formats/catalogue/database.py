@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.catalogue.names import hill_formula, same_species
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import SpeciesLines, species_lines
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import SpeciesLines, species_lines
 from rotor.table import Table
 
 if TYPE_CHECKING:

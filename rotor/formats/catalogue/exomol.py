@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.observed.partition import SUMMED_K, PartitionTable
-from rotor.observed.species import SpeciesLines, species_lines, strength_from_einstein
+from rotor.observed.model.partition import SUMMED_K, PartitionTable
+from rotor.observed.model.species import SpeciesLines, species_lines, strength_from_einstein
 
 PIECE_BYTES = 1 << 22  # text in memory at a time; as Python objects it needs ten times as much
 _PACKED: dict[str, Any] = {".bz2": bz2.open, ".gz": gzip.open, ".xz": lzma.open}

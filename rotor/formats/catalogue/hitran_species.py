@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.formats.catalogue.exomol import opened
 from rotor.formats.lines.hitran import LENGTH, TEMPERATURE_K, isotopologue_number, nm2_mhz, read_hitran
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import SpeciesLines, species_lines, strength_from_einstein
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import SpeciesLines, species_lines, strength_from_einstein
 
 Columns = dict[str, NDArray[Any]]
 

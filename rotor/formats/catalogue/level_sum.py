@@ -17,7 +17,7 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.formats.spcat.compare import in_mhz
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.observed.partition import SUMMED_K, PartitionTable
+from rotor.observed.model.partition import SUMMED_K, PartitionTable
 
 
 def partition_from_lines(catalogue: Catalogue) -> PartitionTable:

@@ -36,8 +36,8 @@ from rotor.formats.toml import read_toml
 from rotor.molecules.molecule import Molecule
 from rotor.structures.coordinates import Named, named
 from rotor.structures.family import Family, family
-from rotor.tops.constants import Constants
-from rotor.tops.uncertain_numbers import parse_named
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.uncertain_numbers import parse_named
 
 if TYPE_CHECKING:
     from rotor.fitting.fit import FitOptions

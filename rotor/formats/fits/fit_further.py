@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotor.fitting.choose import Suggestion, Trial, choose_constants, suggest_lines, try_constants
+from rotor.fitting.choice.choose import Suggestion, Trial, choose_constants, suggest_lines, try_constants
+from rotor.fitting.choice.unmeasured import unmeasured
 from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import with_names
 from rotor.fitting.result import Fit
-from rotor.fitting.unmeasured import unmeasured
 from rotor.formats.fits.fit_request import FitAnswer, FitRequest, answer_fit
 
 MOST_SUGGESTIONS = 20

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, merged
 from rotor.fitting.budgets import constants_budget, predictions_budget
-from rotor.fitting.first_values import beside_zero
 from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import Parameters, parameters, with_names
-from rotor.fitting.publication import publication_table
-from rotor.fitting.report import fit_facts, report_text
+from rotor.fitting.reports.publication import publication_table
+from rotor.fitting.reports.report import fit_facts, report_text
 from rotor.fitting.result import Fit, determined_covariance
+from rotor.fitting.search.first_values import beside_zero
 from rotor.fitting.top_constants import DIPOLES, ConstantSet, TopConstants
 from rotor.formats.lines.assigned_lines import QUANTA, names_field, names_sums, read_assigned_lines
 from rotor.quantum.labelled import LevelModel
@@ -34,7 +34,7 @@ from rotor.tops.top import Top
 from rotor.version import version
 
 if TYPE_CHECKING:
-    from rotor.fitting.choose import Suggestion, Trial
+    from rotor.fitting.choice.choose import Suggestion, Trial
     from rotor.formats.molecules.molecule_file import MoleculeFile
     from rotor.formats.spcat.fits.fit_input import SpfitInput
     from rotor.formats.spcat.text.par import ParameterFile

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.table import Table
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM

@@ -26,7 +26,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.checks import first_names
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top

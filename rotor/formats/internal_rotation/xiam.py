@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from rotor.formats.packed import load
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top

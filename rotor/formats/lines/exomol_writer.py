@@ -17,7 +17,7 @@ import numpy as np
 from rotor import units
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.provenance import provenance_record, write_beside
-from rotor.observed.partition import top_partition
+from rotor.observed.model.partition import top_partition
 from rotor.spectra.lines import Lines
 
 SUFFIX = ".states"

@@ -24,7 +24,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.spectra.intensity import highest_j, intensity_cut
 from rotor.spectra.lines import Lines
-from rotor.spectra.transitions import all_transitions, spin_functions, transition_count
+from rotor.spectra.transitions.pairs import all_transitions, spin_functions, transition_count
 from rotor.thermodynamics.sums.partition import PartitionFunction
 from rotor.thermodynamics.sums.trusted_levels import are_trusted
 from rotor.tops.top import Top

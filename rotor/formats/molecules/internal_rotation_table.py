@@ -18,7 +18,7 @@ from typing import Any
 
 from rotor.formats.molecules.molecule_tables import TableReader, uncertain_number
 from rotor.formats.molecules.spin_table import uncertain_entry
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.internal_rotation import BARE, InternalRotationConstants
 
 SETTINGS = ("vt_max", "functions", "spin_states")

@@ -14,7 +14,7 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Names, Quantity
 from rotor.table import Table
-from rotor.tops.constants_budget import constants_budget
+from rotor.tops.constants.budget import constants_budget
 from rotor.tops.isotopes.isotopologues import Isotopologue, isotopologue, isotopologues, single_substitutions
 from rotor.tops.top import Top
 

@@ -14,7 +14,7 @@
     electronic = "even"                 # or "odd": half turns that change places of like nuclei turn the sign of the
                                         # electronic state, as in the 3Σg- of O2 (spin weights of isotopologues need it)
 
-    [constants]                         # named as in rotor.tops.constants
+    [constants]                         # named as in rotor.tops.constants.constants
     unit = "MHz"
     reduction = "S"
     source = "..."
@@ -127,8 +127,8 @@ from rotor.formats.toml import parse_toml
 from rotor.frozen import dataclass
 from rotor.molecules.molecule import Molecule
 from rotor.tops.components import Tensor
-from rotor.tops.constants import Constants
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.covariance import Covariance
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.spins.spin_constants import SpinConstants

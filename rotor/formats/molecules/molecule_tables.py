@@ -18,8 +18,8 @@ from rotor.frozen import dataclass
 from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
 from rotor.tops.components import Tensor
-from rotor.tops.constants import Constants
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.covariance import Covariance
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.kind import kind_from_moments
 from rotor.tops.spins.spin_constants import SpinConstants

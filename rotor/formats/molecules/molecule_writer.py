@@ -35,7 +35,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
 
     levels_file: file of the level energies, which the text only names. Raises ValueError if they have no file.
 
-    >>> from rotor.tops.constants import Constants
+    >>> from rotor.tops.constants.constants import Constants
     >>> print(molecule_file_text(MoleculeFile("hydrogen chloride", constants=Constants(B=312989.0))))
     name = "hydrogen chloride"
     <BLANKLINE>

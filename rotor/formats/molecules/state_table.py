@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rotor.formats.molecules.molecule_tables import Table, TableReader, is_number, read_spin_weights, uncertain_number
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
 

@@ -22,7 +22,7 @@ from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.int_file import Request
 from rotor.quantum.levels import Levels
 from rotor.spectra.intensity import LGINT_NM2_MHZ, IntensityCut
-from rotor.spectra.transitions import Transitions, all_transitions
+from rotor.spectra.transitions.pairs import Transitions, all_transitions
 
 Quanta = NDArray[np.int16]
 

@@ -52,7 +52,7 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.scheme import Spin, is_axial
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 

@@ -10,7 +10,7 @@ from rotor.formats.spcat.hamiltonian.codes import NO_NAME, is_linear, is_oblate
 from rotor.formats.spcat.hamiltonian.states import FOLDS, SPECIES, odd_under
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Options
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 

@@ -28,7 +28,7 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
-from rotor.spectra.transitions import Transitions
+from rotor.spectra.transitions.pairs import Transitions
 from rotor.thermodynamics.sums.partition import PartitionFunction
 from rotor.tops.top import Top
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.assignment.peak_finding import LEAST_POINTS, pick_peaks_in_pieces
-from rotor.assignment.peaks import PeakList, peak_list
+from rotor.assignment.peaks.peak_finding import LEAST_POINTS, pick_peaks_in_pieces
+from rotor.assignment.peaks.peak_list import PeakList, peak_list
 from rotor.checks import require_file
 from rotor.formats.packed import first_bytes, load
 from rotor.formats.spectra.axis import AXIS_UNITS

@@ -11,7 +11,7 @@ from rotor.plots.picture import GREY, PALETTE, Picture, legend_below, panel, sty
 from rotor.plots.spectra.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text
-from rotor.spectra.emission_request import EmissionAnswer
+from rotor.spectra.emission.request import EmissionAnswer
 from rotor.tops.top import Top
 
 LEAST_NAMED = 0.01  # relative to the brightest line; weaker lines are invisible on a linear axis

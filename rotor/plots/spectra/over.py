@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment.peaks import PeakList
+from rotor.assignment.peaks.peak_list import PeakList
 from rotor.plots.names import Peak, name_peaks
 from rotor.plots.picture import (
     BLUE,

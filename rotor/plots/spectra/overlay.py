@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.observed.model import Component, Sight
+from rotor.observed.model.model import Component, Sight
 from rotor.observed.overlay_table import line_table, modelled
 from rotor.observed.spectrum import ABSORBANCE, KELVIN, ObservedSpectrum
 from rotor.plots.names import SPACE, Peak, write_names

@@ -11,8 +11,8 @@ from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, panel, 
 from rotor.plots.spectra.spectrum import MOST_DECADES, VISIBLE
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import state_text, without_nuclei
-from rotor.spectra.raman import RamanLines
-from rotor.spectra.raman_request import RamanAnswer
+from rotor.spectra.raman.raman import RamanLines
+from rotor.spectra.raman.request import RamanAnswer
 
 MOST_TRIED = 100  # lines, from the strongest down, for which a name is tried
 

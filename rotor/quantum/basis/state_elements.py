@@ -21,7 +21,7 @@ from rotor.quantum.linear_stacks import LinearBlock, LinearStack, numbered, stac
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.wang.basis import SpeciesFactors, WangBlock, parts_of
 from rotor.quantum.wang.wang_matrix import unit_diagonals
-from rotor.tops.operators import Operators, Powers
+from rotor.tops.constants.operators import Operators, Powers
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

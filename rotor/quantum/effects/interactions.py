@@ -20,8 +20,8 @@ from rotor.quantum.effect import Coupling, QuantumEffect, State
 from rotor.quantum.effects.watson import operators_of_name
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import components, ladders, with_powers
-from rotor.tops.operators import Operators
-from rotor.tops.parameter_names import parse_name
+from rotor.tops.constants.operators import Operators
+from rotor.tops.constants.parameter_names import parse_name
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from rotor.checks import did_you_mean, first_names
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.hyperfine_method import EXACT, TOLERANCE_MHZ, HyperfineMethod
-from rotor.tops.parameter_names import parse_name
+from rotor.tops.constants.parameter_names import parse_name
 
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect

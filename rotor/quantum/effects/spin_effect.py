@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins.scheme import EVERY_STATE, Cosines, CosinesWithN, Matrix, Rotor, Scalar, Spin, SpinTerm
-from rotor.tops.parameter_names import ParameterName, parse_name
+from rotor.tops.constants.parameter_names import ParameterName, parse_name
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -2,7 +2,7 @@
 
 Each term of an effective Hamiltonian in one vibrational state is c · ½[Jz^2q, J₊^2n + J₋^2n]₊ · J^2p (n = 0:
 c · J^2p Jz^2q), so that a Hamiltonian is a table {(p, q, n): c in MHz}. `rotor.quantum.wang.wang_matrix` has the matrix elements,
-`rotor.tops.operators` the terms of all names.
+`rotor.tops.constants.operators` the terms of all names.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.tops.operators import Operators, Powers, added, axis_order, distortion_terms, spelled_powers
+from rotor.tops.constants.operators import Operators, Powers, added, axis_order, distortion_terms, spelled_powers
 
 if TYPE_CHECKING:
-    from rotor.tops.constants import Constants
+    from rotor.tops.constants.constants import Constants
     from rotor.tops.top import Top
 
 
 def operators_by_name(constants: Constants) -> dict[str, Operators]:
     """∂H/∂c of the constants c by name; H is their sum times the constants.
 
-    >>> from rotor.tops.constants import Constants
+    >>> from rotor.tops.constants.constants import Constants
     >>> operators_by_name(Constants(A=9.0, B=3.0, C=2.0))["C"]
     {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): -0.25}
     """
@@ -31,7 +31,7 @@ def operators_by_name(constants: Constants) -> dict[str, Operators]:
 def operators_of_name(constants: Constants, name: str) -> Operators:
     """∂H/∂c of a constant by its name, whether or not it has a value in the set.
 
-    >>> from rotor.tops.constants import Constants
+    >>> from rotor.tops.constants.constants import Constants
     >>> operators_of_name(Constants(A=9.0, B=3.0, C=2.0, reduction="A"), "DeltaJ")
     {(2, 0, 0): -1.0}
     """

@@ -25,7 +25,7 @@ from rotor.quantum.hyperfine_method import used_method
 from rotor.quantum.levels import Levels
 from rotor.quantum.tabulated import tabulated_level_errors
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
-from rotor.tops.covariance import Covariance
+from rotor.tops.constants.covariance import Covariance
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -42,7 +42,7 @@ def level_spread(top: Top, levels: Levels, covariance: Covariance) -> Floats:
 def level_errors(top: Top, levels: Levels, covariance: Covariance) -> Floats:
     """One standard deviation of each energy, (levels,) in MHz, relative to the zero of the Hamiltonian.
 
-    >>> from rotor.tops.constants import Constants
+    >>> from rotor.tops.constants.constants import Constants
     >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top(Constants(B=6000.0, uncertainties={"B": 0.1}))

@@ -22,7 +22,7 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import elements_by_order, order_of, scalar_energy
 from rotor.table import counted
-from rotor.tops.operators import Operators
+from rotor.tops.constants.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -23,7 +23,7 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import diagonal_elements
-from rotor.tops.operators import Operators
+from rotor.tops.constants.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

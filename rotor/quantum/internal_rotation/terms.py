@@ -36,8 +36,8 @@ from rotor.quantum.internal_rotation.frames import frame_along
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_squared, j_x, j_y, j_z, ladder, sum_of_powers
 from rotor.quantum.torsion import cosine, p_alpha, sine
+from rotor.tops.constants.operators import Operators, distortion_terms
 from rotor.tops.internal_rotation import BARRIERS, NAMED, SPELLED
-from rotor.tops.operators import Operators, distortion_terms
 
 Rows = tuple[tuple[float, float, float], ...]
 MOST_STEPS = 4  # J whose elements show the phase of operators with up to eight steps of K

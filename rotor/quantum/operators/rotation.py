@@ -20,7 +20,7 @@ from rotor.arrays import Ints
 from rotor.quantum.operators.algebra import UNIT, Factor, Labels, Operator, Shift, Values, diagonal, shift
 from rotor.quantum.symmetric_top_elements import coupling_to
 from rotor.quantum.tensors import spherical_components
-from rotor.tops.operators import Powers, axis_order
+from rotor.tops.constants.operators import Powers, axis_order
 
 Weight = Callable[[Ints, Ints, Ints, Ints], Values]  # of J', J, K' and K
 

@@ -43,7 +43,7 @@ from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.spins.coupling import patterns, patterns_of_three, patterns_of_total, recoupling, recoupling_of_three
 from rotor.quantum.tensors import BodyTensor, body_tensor
 from rotor.quantum.wang.basis import SpeciesFactors
-from rotor.tops.operators import Powers
+from rotor.tops.constants.operators import Powers
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

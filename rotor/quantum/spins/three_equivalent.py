@@ -26,7 +26,7 @@ from rotor.quantum.spins.many_f import Frame, groups_of, hamiltonians
 from rotor.quantum.spins.parts import PartColumns, SpinPart
 from rotor.quantum.spins.rotor import Exist, wang_functions
 from rotor.quantum.wang.basis import Part, phase
-from rotor.tops.operators import axis_order
+from rotor.tops.constants.operators import axis_order
 
 _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel
 

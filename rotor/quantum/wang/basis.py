@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import numbers_in_runs
-from rotor.tops.operators import REPRESENTATIONS as REPRESENTATIONS
-from rotor.tops.operators import axis_order
+from rotor.tops.constants.operators import REPRESENTATIONS as REPRESENTATIONS
+from rotor.tops.constants.operators import axis_order
 
 _WANG = ((0, 1), (2, -1), (1, 1), (1, -1))  # E+, E-, O+, O-: lowest K and s
 

@@ -23,7 +23,7 @@ from rotor.quantum.wang.wang_matrix import (
     lowest_energies,
     scalar_energy,
 )
-from rotor.tops.operators import AXIAL_REPRESENTATION, Operators, added
+from rotor.tops.constants.operators import AXIAL_REPRESENTATION, Operators, added
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.wang_matrix import block_bands, scalar_energy
-from rotor.tops.operators import CUBIC_TENSOR, Operators
+from rotor.tops.constants.operators import CUBIC_TENSOR, Operators
 from rotor.tops.spins.spin_weights import CUBIC_IRREPS
 
 _SUBBLOCKS = {"A1": (0, 1), "B1": (2, 1), "A2": (0, -1), "B2": (2, -1)}  # K modulo 4 and character under C2x

@@ -18,7 +18,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.wang.basis import WangBlock
-from rotor.tops.operators import Operators, Powers
+from rotor.tops.constants.operators import Operators, Powers
 
 FEW = 20  # bisection pays for at most one in so many eigenvalues
 AT_ONCE = 32  # matrices of one size with at most so many rows are solved together

@@ -22,7 +22,7 @@ from rotor.scenes.sweep.inputs import InputHashes
 from rotor.scenes.sweep.points import Point, check_first, points
 from rotor.scenes.sweep.record import Record, SweepResult, appended, read_records
 from rotor.temporary import locked_file
-from rotor.verbs.calculation import Outcome
+from rotor.verbs.common.calculation import Outcome
 
 AHEAD = 200  # submitted points that have not begun: workers never wait, and memory stays bounded
 

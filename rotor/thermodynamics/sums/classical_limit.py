@@ -45,7 +45,7 @@ from rotor.frozen import dataclass
 from rotor.quantum.effects.watson import centrifugal_operators
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
 from rotor.thermodynamics.sums.species import weights_in_species
-from rotor.tops.operators import AXIAL_REPRESENTATION, REPRESENTATIONS, Operators
+from rotor.tops.constants.operators import AXIAL_REPRESENTATION, REPRESENTATIONS, Operators
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:

@@ -58,7 +58,7 @@ def classical_above_if_known(top: Top, tolerance: float = 0.01) -> float | None:
 
 def _rigid(top: Top) -> Top:
     """The top without distortion."""
-    from rotor.tops.constants import constants_from_moments
+    from rotor.tops.constants.constants import constants_from_moments
     from rotor.tops.top import Top
 
     constants = constants_from_moments(top.moments_u_angstrom2, top.kind)

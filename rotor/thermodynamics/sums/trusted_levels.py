@@ -20,7 +20,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators, to_o
 from rotor.quantum.levels import Levels, energies_like
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
-from rotor.tops.operators import REPRESENTATIONS
+from rotor.tops.constants.operators import REPRESENTATIONS
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

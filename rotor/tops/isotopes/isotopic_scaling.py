@@ -18,8 +18,8 @@ from rotor.arrays import Floats
 from rotor.geometry.inertia import PrincipalFrame
 from rotor.table import with_article
 from rotor.tops.components import symmetric_tensor
-from rotor.tops.constants import Constants
-from rotor.tops.operators import distortion_terms, spelled_powers
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.operators import distortion_terms, spelled_powers
 from rotor.tops.top import Top
 
 # Errors of scaled distortion constants against fitted ones; test_isotopologues.py measures them again.

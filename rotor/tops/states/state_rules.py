@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.tops.constants import Constants
-from rotor.tops.kind_of_constants import vocabulary
-from rotor.tops.operators import spelled_powers
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.kind_of_constants import vocabulary
+from rotor.tops.constants.operators import spelled_powers
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants, Vector
 

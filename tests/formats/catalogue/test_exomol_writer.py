@@ -8,7 +8,7 @@ import pytest
 from rotor.formats import write
 from rotor.formats.catalogue.exomol import exomol_species, read_states
 from rotor.formats.read_write import read
-from rotor.observed.species import species_from_lines
+from rotor.observed.model.species import species_from_lines
 from rotor.quantum.effects.of_top import effects_of
 from rotor.spectra.lines import line_list
 from rotor.tops.top import Top

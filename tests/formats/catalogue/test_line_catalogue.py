@@ -14,8 +14,8 @@ from rotor.formats.catalogue.catdir import read_catdir
 from rotor.formats.catalogue.database import LineCatalogue
 from rotor.formats.catalogue.names import hill_formula
 from rotor.formats.lines.hitran import hitran_lines, write_hitran
-from rotor.observed.partition import PartitionTable
-from rotor.observed.species import species_from_lines
+from rotor.observed.model.partition import PartitionTable
+from rotor.observed.model.species import species_from_lines
 from rotor.spectra.lines import line_list
 from rotor.tops.top import Top
 

@@ -12,7 +12,7 @@ from rotor.formats.molecules.library import library_file, library_molecule, name
 from rotor.formats.molecules.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text, write_molecule_file
 from rotor.molecules.molecule import Molecule
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 
 LIBRARY = sorted(set(names().values()))

@@ -24,8 +24,8 @@ from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.rotation import solve_rotation
 from rotor.spectra.lines import dipoles_by_state, line_list
-from rotor.spectra.raman import raman_lines
-from rotor.spectra.transitions import all_transitions
+from rotor.spectra.raman.raman import raman_lines
+from rotor.spectra.transitions.pairs import all_transitions
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.spins.spin_constants import SpinConstants

@@ -16,9 +16,9 @@ from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.basis import REPRESENTATIONS
 from rotor.spectra.lines import line_list
-from rotor.spectra.raman import raman_lines
+from rotor.spectra.raman.raman import raman_lines
 from rotor.thermodynamics.sums.partition import partition_function
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 

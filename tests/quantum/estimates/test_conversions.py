@@ -12,9 +12,9 @@ from rotor.quantum import reductions as conversions
 from rotor.quantum.estimates.budgets import level_errors
 from rotor.quantum.reductions import to_reduction, to_representation
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants
-from rotor.tops.covariance import Covariance
-from rotor.tops.operators import REPRESENTATIONS
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.covariance import Covariance
+from rotor.tops.constants.operators import REPRESENTATIONS
 from rotor.tops.top import Top
 
 QUARTIC = {

@@ -11,7 +11,7 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.estimates.derivatives import expectations, level_derivatives
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 

@@ -7,7 +7,7 @@ import pytest
 
 import rotor
 from rotor.quantum.estimates.budgets import known_covariance, source_of_errors
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 
 STEP = 1e-4  # of the estimated error, for differences
 

@@ -14,7 +14,7 @@ from rotor.quantum.blocks import coloured_components
 from rotor.quantum.fields.axial import cosine_bands, cosine_squared_bands
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import field_space, tilted_space
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 Z = np.array([0, 0, 1.0])

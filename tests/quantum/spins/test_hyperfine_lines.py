@@ -20,7 +20,7 @@ from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import Lines, line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 

@@ -16,7 +16,7 @@ from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import line_list
-from rotor.spectra.transitions import all_transitions
+from rotor.spectra.transitions.pairs import all_transitions
 from rotor.thermodynamics.sums.partition import PartitionFunction
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top

@@ -16,7 +16,7 @@ from rotor.spectra.lines import line_list
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermodynamics.sums.partition import partition_function
 from rotor.thermodynamics.sums.spin_factor import rotational_sum
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spin_names, twice_spin
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top

@@ -13,7 +13,7 @@ from rotor.quantum.spins.contraction import operators_of_stacks, pieces_in_both_
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
 from rotor.quantum.spins.scheme import ByElements, Cosines, CosinesWithN, Scalar
 from rotor.quantum.tensors import body_tensor, tensor_between
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 TOP = Top(Constants(A=9400.0, B=3100.0, C=2500.0, DeltaJK=-2.0, deltaK=0.3), dipole_abc_debye=(1.2, 0.7, 0.4))

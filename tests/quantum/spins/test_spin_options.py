@@ -19,8 +19,8 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.coupling import patterns, patterns_of_total, recoupling
 from rotor.quantum.spins.scheme import ByElements, CosinesWithN, Scalar
-from rotor.spectra.transitions import all_transitions
-from rotor.tops.constants import Constants
+from rotor.spectra.transitions.pairs import all_transitions
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 TOP = Top(Constants(A=9400.0, B=3100.0, C=2500.0), dipole_abc_debye=(1.2, 0.0, 0.0))

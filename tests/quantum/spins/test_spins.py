@@ -19,8 +19,8 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
-from rotor.spectra.transitions import all_transitions
-from rotor.tops.constants import Constants
+from rotor.spectra.transitions.pairs import all_transitions
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 ASYMMETRIC = Top(Constants(A=9400.0, B=3100.0, C=2500.0, DeltaJK=-2.0, deltaK=0.3), dipole_abc_debye=(1.2, 0.7, 0.4))

@@ -22,9 +22,9 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.coupling import patterns, patterns_of_three, recoupling_of_three, symmetric_functions
 from rotor.quantum.spins.levels import unmixed_levels
-from rotor.spectra.transitions import all_transitions
+from rotor.spectra.transitions.pairs import all_transitions
 from rotor.thermodynamics.sums.partition import partition_function
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 

@@ -14,7 +14,7 @@ from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.basis import REPRESENTATIONS
 from rotor.spectra.lines import line_list
-from rotor.tops.constants import Constants
+from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 
 A, B, C = 9000.0, 5000.0, 3500.0

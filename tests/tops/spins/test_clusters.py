@@ -9,8 +9,8 @@ from slow_matrix import cubic_matrix, threefold_turn
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.spherical_top import DIMENSION, tensor_eigenvalues
 from rotor.thermodynamics.sums.partition import partition_function
-from rotor.tops.constants import Constants
-from rotor.tops.operators import CUBIC_TENSOR
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.operators import CUBIC_TENSOR
 from rotor.tops.spins.spin_weights import CUBIC_IRREPS, SpinWeights
 from rotor.tops.top import Top
 

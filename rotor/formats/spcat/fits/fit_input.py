@@ -27,7 +27,7 @@ from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remar
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, npar_notes, read_par
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
-from rotor.tops.constants import AxisOrderError, Constants
+from rotor.tops.constants.constants import AxisOrderError, Constants
 
 _NO_ERRTST = 1e6  # SPFIT's value for an ERRTST of 0 or less
 

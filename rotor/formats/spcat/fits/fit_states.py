@@ -26,7 +26,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct, matching_rows
 from rotor.fitting.assignment import Assignments
-from rotor.fitting.unmeasured import measured_range, without_measured
+from rotor.fitting.choice.unmeasured import measured_range, without_measured
 from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.fitting.publication import Row, value_text
+from rotor.fitting.reports.publication import Row, value_text
 from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.spcat.fits.fit_input import SpfitInput, correlation_text

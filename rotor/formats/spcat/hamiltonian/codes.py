@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, join_code, ladder_typ, split_code, square_typ
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
-from rotor.tops import operators as published
-from rotor.tops.constants import Constants
-from rotor.tops.kind_of_constants import RIGID
-from rotor.tops.operators import Operators, axis_order, spelled_powers, spelled_term
+from rotor.tops.constants import operators as published
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.kind_of_constants import RIGID
+from rotor.tops.constants.operators import Operators, axis_order, spelled_powers, spelled_term
 
 NOT_YET = "is read but not computed yet"
 PLURAL_NOT_YET = "are read but not computed yet"

@@ -41,7 +41,7 @@ from rotor.quantum.spins.scheme import (
 )
 from rotor.quantum.spins.stack_elements import elements_of_pair
 from rotor.quantum.wang.basis import SpeciesFactors, factors_of_pairs, wang_blocks
-from rotor.tops.operators import Operators
+from rotor.tops.constants.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -43,7 +43,7 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinFunctions
 from rotor.quantum.spins.parts import assigned, names_of_parts
 from rotor.quantum.wang.basis import WangBlock, names_of
-from rotor.tops.operators import Operators
+from rotor.tops.constants.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.quantum.label_tracking import NamedFunctions, Naming

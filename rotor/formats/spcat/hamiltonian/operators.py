@@ -56,7 +56,7 @@ from rotor.quantum.operators.rotation import (
 )
 from rotor.quantum.spins.scheme import ByElements, Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
 from rotor.quantum.tensors import spherical_components
-from rotor.tops.operators import Operators
+from rotor.tops.constants.operators import Operators
 
 
 @lru_cache(maxsize=256)

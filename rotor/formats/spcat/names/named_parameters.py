@@ -38,8 +38,8 @@ from rotor.formats.spcat.model import option_line
 from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile
 from rotor.quantum.effects.spin_effect import NuclearQuadrupole, SpinRotation, SpinSpin
 from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Scheme, SpinTerm, scheme_of
-from rotor.tops.constants import Constants
-from rotor.tops.parameter_names import ParameterName, parse_name
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.parameter_names import ParameterName, parse_name
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top

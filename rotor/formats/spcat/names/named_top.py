@@ -35,7 +35,7 @@ from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.quantum.effects.spin_effect import matrix_of
 from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Scalar
-from rotor.tops.constants import AxisOrderError, Constants
+from rotor.tops.constants.constants import AxisOrderError, Constants
 from rotor.tops.spins.spin_constants import SpinConstants, is_isotope
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants

@@ -15,8 +15,8 @@ from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, read_int
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile, format_par, read_par
 from rotor.quantum.effects.watson import centrifugal_operators, rigid_operators
-from rotor.tops.constants import Constants
-from rotor.tops.kind_of_constants import vocabulary
+from rotor.tops.constants.constants import Constants
+from rotor.tops.constants.kind_of_constants import vocabulary
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 

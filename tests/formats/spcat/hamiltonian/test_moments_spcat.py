@@ -19,7 +19,7 @@ from rotor.formats.spcat.text.int_file import Dipole, read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.many_f_lines import moments_of
-from rotor.spectra.transitions import all_transitions
+from rotor.spectra.transitions.pairs import all_transitions
 from rotor.tops.top import Top
 
 TOP = 2  # highest N that is compared

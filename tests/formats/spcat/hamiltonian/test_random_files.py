@@ -17,7 +17,7 @@ from random_spcat import RIGID, RandomFile, file_of_l, file_of_states, with_both
 
 from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.quantum.levels import Levels
-from rotor.spectra.transitions import all_transitions
+from rotor.spectra.transitions.pairs import all_transitions
 
 CLOSE = 1e-6  # of the largest energy; round-off of 1e-15 of it mixes closer levels by more than 1e-9
 # states, spins, whether with ranges of K

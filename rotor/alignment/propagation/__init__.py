@@ -1,0 +1,1 @@
+"""Propagation of wave packets through pulses."""

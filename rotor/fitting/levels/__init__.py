@@ -1,0 +1,1 @@
+"""Labelled levels and their derivatives, for the kinds of lines that a fit takes."""

@@ -1,0 +1,1 @@
+"""What a fit reports: notes, parameters with errors, tables for publication."""

@@ -1,0 +1,1 @@
+"""The least-squares search: residuals with derivatives, start values, strategies."""

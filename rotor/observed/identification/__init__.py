@@ -1,0 +1,1 @@
+"""Identification of the species that an observed spectrum needs."""

@@ -1,0 +1,1 @@
+"""LTE and non-LTE models of a source: species, partition functions, parameters."""

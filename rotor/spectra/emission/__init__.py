@@ -1,0 +1,1 @@
+"""Emission of a source with one or several molecules, as a radio telescope sees it."""

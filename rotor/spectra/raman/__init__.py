@@ -1,0 +1,1 @@
+"""Rotational Raman lines."""

@@ -1,0 +1,1 @@
+"""Pairs of states that form a line, found without visiting all pairs."""

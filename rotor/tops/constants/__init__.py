@@ -1,0 +1,1 @@
+"""Rotational constants: names, operators, kinds, covariance and their printed form."""

@@ -1,0 +1,408 @@
+"""Subject of `tumble`: a molecule, an everyday body or bare moments, with its initial motion, times and torques; their units."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE
+from rotor.frozen import dataclass
+from rotor.requests.field import MOLECULE as MOLECULE_PANEL
+from rotor.requests.field import NUMERICS, all_fields, declared
+from rotor.requests.fill import Entries, NamedError, naming, read_instance, written_fields
+from rotor.requests.readers import Custom, Field, Grid, Quantity, Reader, Whole
+from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL, parse_grid
+from rotor.verbs.common.subjects import MOLECULE, OneMolecule, saved_molecule
+from rotor.verbs.common.verb import Place, Subject, Verb
+
+if TYPE_CHECKING:
+    from rotor.classical.bodies import NamedBody
+    from rotor.classical.driven import DrivenRequest
+    from rotor.classical.motion import Units
+    from rotor.classical.tumble import Three, TumbleRequest
+
+_UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
+
+
+def three(raw: Any, unit: str = "") -> Three:
+    """Three finite numbers; a text may carry a unit, else `unit` holds."""
+    x, y, z = _numbers(raw, 3, "three numbers, such as 0.6,0.8,1.0", unit)
+    return x, y, z
+
+
+def _four(raw: Any) -> tuple[float, float, float, float]:
+    w, x, y, z = _numbers(raw, 4, "four numbers, such as 1,0,0,0")
+    return w, x, y, z
+
+
+def _numbers(raw: Any, count: int, expected: str, unit: str = "") -> list[float]:
+    if isinstance(raw, str) and (raw.count(",") != count - 1 or ":" in raw):
+        raise ValueError(f"{raw!r}: expected {expected}")
+    values = [float(number) for number in (parse_grid(raw, unit) if isinstance(raw, str) else raw)]
+    if len(values) != count:
+        raise ValueError(f"{raw!r}: expected {expected}")
+    return values
+
+
+def _moments(raw: Any) -> Three:
+    from rotor.classical.euler import checked_moments
+
+    moments = three(raw, "kg*m2" if in_si(raw) else "")
+    try:
+        checked_moments(moments)
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(f"{raw!r}: {text}" if isinstance(raw, str) else text) from None
+    return moments
+
+
+def _named_body(raw: Any) -> NamedBody:
+    from rotor.classical.bodies import named_body
+
+    return named_body(raw)
+
+
+def in_si(moments: Any) -> bool:
+    """Whether the moments carry a unit."""
+    return isinstance(moments, str) and bool(_UNIT_AT_END.search(moments))
+
+
+def _units(raw: Any) -> str:
+    if raw not in ("", "SI"):
+        raise ValueError(f'{raw!r}: expected "SI", or "" for any coherent set')
+    return str(raw)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InBodyUnits(Reader):
+    """Numbers in the body's units. Text is read once the body is known."""
+
+    metavar: str
+    scene_type: Any = list[float]
+
+    def write(self, value: Any) -> Any:
+        """Text and a single number unchanged, several numbers as a list."""
+        return value if isinstance(value, str | Real) else [float(number) for number in value]
+
+
+@dataclass(frozen=True)
+class BodyInput:
+    """A rigid body instead of a molecule, in any coherent units."""
+
+    body: NamedBody | None = declared(
+        None, Custom(_named_body, lambda body: body.name, "NAME"), "Everyday body instead of a molecule: book, phone, racket or wing-nut",
+        "body.name", option="--body", panel=MOLECULE_PANEL, common=True, example="book",
+    )  # fmt: skip
+    moments: Three | None = declared(
+        None, Custom(_moments, list, "I1,I2,I3", list[float] | str),
+        'Principal moments instead of a molecule, in any order: "1,2,3 kg m2", or plain numbers in any coherent units', "body.moments",
+        panel=MOLECULE_PANEL, common=True, example=[0.3, 0.35, 0.4],
+    )  # fmt: skip
+    units: str = declared("", Custom(_units), '"SI" (kg m², s, J), or "" for any coherent set', "body.units", option="")
+    angular_momentum: Three | None = declared(
+        None,
+        InBodyUnits("L1,L2,L3"),
+        "Angular momentum at time 0, in principal axes",
+        "body.angular_momentum",
+        option="",
+        example=[1.8, 0.4, -0.9],
+    )
+    angular_velocity: Three | None = declared(
+        None, InBodyUnits("W1,W2,W3"),
+        "Angular velocity at time 0, in principal axes, instead of the angular momentum: 0.1,10,0 (rad/s; rad/ps "
+        "for a molecule; also rpm, deg/s)", "body.angular_velocity", option="--omega", common=True, example=[0.1, 15.0, 0.1],
+    )  # fmt: skip
+    attitude: tuple[float, float, float, float] | None = declared(
+        None, Custom(_four, list, "W,X,Y,Z", list[float]), "With effects: unit quaternion, body to space, at time 0", "body.attitude",
+        example=[1.0, 0.0, 0.0, 0.0],
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MotionInput:
+    """Initial motion of a body, torques on it, and output times."""
+
+    temperature_k: float = declared(
+        300.0, Quantity("K", above=0, metavar="T"), "Temperature of the thermal mean |L| of a molecule (K)",
+        "conditions.temperature", common=True,
+    )  # fmt: skip
+    angular_momentum: Three | None = declared(
+        None, InBodyUnits("L1,L2,L3"), "Angular momentum at time 0, in principal axes (ħ for a molecule; by default the thermal mean)",
+        "conditions.angular_momentum", common=True, example=[10.0, 0.1, 0.1],
+    )  # fmt: skip
+    times: Any = declared(
+        None, InBodyUnits("GRID", list[float] | str), "Times (ps for a molecule, s with SI units); by default two periods",
+        "conditions.times", common=True, example="0:2:201",
+    )  # fmt: skip
+    effects: tuple[Any, ...] = declared(
+        (), BODY_EFFECTS, 'Torque or other effect: its name and parameters, such as "linear drag coefficients=0.1,0.1,0.2"; repeatable',
+        "effects", option="--effect", common=True,
+    )  # fmt: skip
+    tolerance: float = declared(
+        DEFAULT_TOLERANCE, Quantity(), "With effects: tolerance of a step, relative to |L| and one radian", "numerics.tolerance",
+        typed=DEFAULT_TOLERANCE,
+    )  # fmt: skip
+    step: float | None = declared(
+        None, InBodyUnits("T", float | str),
+        "With effects: step of a splitting instead, where no torque depends on the angular velocity", "numerics.step", panel=NUMERICS,
+        example=0.01,
+    )  # fmt: skip
+    order: int = declared(4, Whole(), "Order of the splitting: 2, 4, 6 or 8", "numerics.order")
+
+
+BODY = {field.name: field for field in all_fields(BodyInput).values()}
+MOTION = {field.name: field for field in all_fields(MotionInput).values()}
+
+
+_HBAR_PER_U_ANGSTROM2_RAD_PER_PS = ASE_TIME_PS / HBAR_CLASSICAL  # angular momentum in ħ of 1 u Å² at 1 rad/ps
+AT_REST = (1.0, 0.0, 0.0, 0.0)  # attitude: body and space axes coincide
+TURN_RAD_PER_S = 2 * math.pi  # default of a named body: one turn a second
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body that is not a molecule. moments: principal ones, in coherent or SI units.
+
+    named: dimensions of an everyday body. start: default angular momentum, and how it was chosen.
+    """
+
+    text: str
+    moments: Three
+    units: Units
+    axes: tuple[str, str, str] = ("1", "2", "3")
+    named: NamedBody | None = None
+    start: tuple[Three, str] | None = None
+
+
+@dataclass(frozen=True)
+class TurningBody(OneMolecule):
+    """A molecule, an everyday body or bare moments."""
+
+    further: type = BodyInput
+    scene_fields: ClassVar[tuple[Field, ...]] = (
+        replace(MOLECULE, default=None, example="water"),
+    )  # a body may replace it
+
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
+        """Read the molecule or the body."""
+        body = read_body(entries)
+        return (
+            super().read(entries, place, verb) if body is None else Subject({"body": body}, (), body.text, place.note)
+        )
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The molecule or the body, and its initial motion."""
+        times = {} if request.times is None else {"conditions.times": [float(time) for time in request.times]}
+        if subject.molecules:
+            kelvin = getattr(request, "temperature_k", None)
+            entered = MotionInput(angular_momentum=request.angular_momentum)
+            start = entered if kelvin is None else MotionInput(temperature_k=kelvin)
+            return saved_molecule(subject.molecules[0], folder) | times | written_fields(start)
+        named = subject.values["body"].named
+        units = "SI" if request.units.time else ""
+        body = BodyInput(body=named) if named else BodyInput(moments=request.moments, units=units)
+        body = replace(body, angular_momentum=request.angular_momentum)
+        if not hasattr(request, "effects"):
+            return written_fields(body) | times
+        attitude = None if request.attitude == AT_REST else request.attitude
+        body = replace(body, angular_velocity=request.angular_velocity, attitude=attitude)
+        settings = {name: getattr(request, name) for name in ("effects", "tolerance", "step", "order")}
+        return written_fields(body) | times | written_fields(MotionInput(**settings))
+
+
+def read_body(entries: Entries) -> Body | None:
+    """The body given by moments or by name; None for a molecule."""
+    inputs, in_scene = read_instance(BodyInput, entries), entries.style == "key"
+    source, constants = entries.values.get("molecule.source"), entries.values.get("molecule.constants")
+    momenta = inputs.angular_momentum, entries.of(MOTION["angular_momentum"])
+    if inputs.angular_velocity is not None and momenta != (None, None):
+        raise NamedError("{angular_velocity} and {angular_momentum}: each fixes the motion; give one of them")
+    if inputs.body is not None and inputs.moments is not None:
+        raise NamedError("{body} and {moments}: give one of them")
+    named = inputs.body or _named_source(source)
+    if inputs.moments is None and named is None:
+        if source is None and constants is None:
+            raise NamedError(
+                "molecule, body: give one of them"
+                if in_scene
+                else "expected a molecule, {constants}, {moments} or {body}; try 'rotor tumble water'"
+            )
+        return None
+    if (source is not None and (named is None or inputs.body is not None)) or constants is not None:
+        other = "moments" if named is None else "body"
+        raise NamedError(f"{'molecule, body' if in_scene else f'a molecule and {{{other}}}'}: give one of them")
+    if entries.values.get("molecule.isotopes"):
+        raise NamedError("{isotopes}: bare moments have no atoms; give the moments of the isotopologue itself")
+    if entries.has(MOTION["temperature_k"]):
+        raise NamedError("{temperature_k}: bare moments have no units for a temperature; give {angular_momentum} alone")
+    if in_scene and entries.has(MOTION["angular_momentum"]):
+        raise NamedError("{angular_momentum}: is for a molecule; for a body give it in [body]")
+    return _body_of_moments(entries, inputs) if named is None else _everyday_body(named)
+
+
+def _named_source(source: Any) -> NamedBody | None:
+    """The everyday body that a source names, unless it is a file."""
+    from rotor.classical.bodies import BODIES
+
+    return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
+
+
+def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
+    from rotor.classical.motion import COHERENT, SI
+
+    assert inputs.moments is not None
+    typed = entries.of(BODY["moments"])
+    text = typed if isinstance(typed, str) else ",".join(f"{moment:g}" for moment in inputs.moments)
+    return Body(text, inputs.moments, SI if inputs.units == "SI" or in_si(typed) else COHERENT)
+
+
+def _everyday_body(body: NamedBody) -> Body:
+    """An everyday body in SI units; its default motion is one turn a second about the intermediate, unstable axis."""
+    from rotor.classical.gas.thermal_momentum import off_intermediate_axis
+    from rotor.classical.motion import SI
+    from rotor.thermodynamics.gas.thermal_tumble import TILT_DEGREES
+
+    moments = np.array(body.moments_kg_m2)
+    size = TURN_RAD_PER_S * float(np.sort(moments)[1])
+    momentum = three(off_intermediate_axis(moments, size, math.radians(TILT_DEGREES)))
+    middle = body.axes[int(np.argsort(moments)[1])]
+    source = f"one turn a second, {TILT_DEGREES:g} degrees off the intermediate axis, {middle}"
+    return Body(body.name, three(moments), SI, body.axes, body, (momentum, source))
+
+
+def build(verb: Verb, entries: Entries, subject: Subject) -> TumbleRequest | DrivenRequest:
+    """The request for a molecule or a body: free motion, or motion under effects."""
+    motion, start = read_instance(MotionInput, entries), read_instance(BodyInput, entries)
+    in_scene, is_body = entries.style == "key", "body" in subject.values
+    if in_scene and start.angular_momentum is not None:
+        motion = replace(motion, angular_momentum=start.angular_momentum)
+    momentum = (BODY if in_scene and is_body else MOTION)["angular_momentum"]
+    with naming([*BODY.values(), momentum], entries.style):
+        if motion.effects:
+            return _driven(entries, subject, start, motion)
+        _refuse_without_effect(entries)
+        make = _motion_of_body if is_body else _motion_of_top
+        return make(entries, subject, start, motion)
+
+
+def _refuse_without_effect(entries: Entries) -> None:
+    """Refuse settings of integration for a free motion; scenes may hold settings that are not used."""
+    of_steps = () if entries.style == "key" else ("tolerance", "step", "order")
+    for field in (BODY["attitude"], *(MOTION[name] for name in of_steps)):
+        if entries.has(field):
+            raise NamedError(
+                f"{{{field.name}}}: belongs to a motion under effects; give {{effects}}, or leave it out: free motion is exact"
+            )
+
+
+def _times(entries: Entries, motion: MotionInput, unit: str) -> tuple[float, ...] | None:
+    """Times in the unit of the body."""
+    field = replace(MOTION["times"], reader=Grid(unit))
+    return None if motion.times is None else field.read(motion.times, entries.style)
+
+
+def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+    from rotor.classical.tumble import TumbleRequest
+
+    body: Body = subject.values["body"]
+    chosen = _start(entries, start, motion, np.array(body.moments), (body.units.rate, "")) or body.start
+    if chosen is None:
+        raise NamedError(
+            "body: give either {body.angular_momentum} or {angular_velocity}"
+            if entries.style == "key"
+            else "{angular_momentum}: expected with {moments}: three components in the axes of the moments; or {angular_velocity}"
+        )
+    times = _times(entries, motion, body.units.time)
+    request = TumbleRequest(body.moments, chosen[0], times, body.units, body.axes, chosen[1], body.named)
+    for text in request.notes:
+        subject.note(text)
+    return request
+
+
+def _motion_of_top(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+    from rotor.thermodynamics.gas.thermal_tumble import thermal_tumble
+
+    top, times = subject.top, _times(entries, motion, "ps")
+    by_velocity = start.angular_velocity is not None
+    scale = _HBAR_PER_U_ANGSTROM2_RAD_PER_PS if by_velocity else 1.0  # ħ for 1 rad/ps
+    chosen = _start(entries, start, motion, scale * np.array(top.moments_u_angstrom2), ("rad/ps", "ħ"))
+    if chosen is None:
+        return thermal_tumble(top, temperature_k=motion.temperature_k, times_ps=times)
+    if entries.has(MOTION["temperature_k"]):
+        fixed = "angular_velocity" if by_velocity else "angular_momentum"
+        raise NamedError(
+            f"{{temperature_k}} and {{{fixed}}}: give one of them; the first chooses |L|, the second fixes it"
+        )
+    return replace(thermal_tumble(top, angular_momentum_hbar=chosen[0], times_ps=times), source=chosen[1])
+
+
+def _start(
+    entries: Entries, start: BodyInput, motion: MotionInput, moments: Any, units: tuple[str, str]
+) -> tuple[Three, str] | None:
+    """The nonzero initial angular momentum, entered directly or as an angular velocity, and its source; None if neither is given.
+
+    units: of the angular velocity and of the angular momentum.
+    """
+    from rotor.classical.euler import checked_momentum, checked_velocity
+
+    by_velocity = start.angular_velocity is not None
+    in_body = BODY if start.angular_momentum is not None else MOTION  # the key of a scene's body
+    field = BODY["angular_velocity"] if by_velocity else in_body["angular_momentum"]
+    value = start.angular_velocity if by_velocity else motion.angular_momentum
+    if value is None:
+        return None
+    text = value if isinstance(value, str) else list(value)
+    try:
+        vector = three(value, units[0] if by_velocity else units[1])
+        momentum = moments * checked_velocity(vector, moments) if by_velocity else checked_momentum(vector, moments)
+    except ValueError as error:
+        message = str(error)
+        quoted = message if message.startswith(f"{text!r}") else f"{text!r}: {message}"
+        raise ValueError(f"{field.name}: {quoted}") from None
+    if not momentum.any():
+        raise ValueError(f"{field.name}: {text!r}: a body at rest does not tumble; give a component that is not 0")
+    how = "given as an angular velocity" if by_velocity else "given"
+    return three(momentum), f"{how} ({field.called(entries.style)})"
+
+
+def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
+    from rotor.classical.driven import DrivenRequest
+
+    if "body" not in subject.values:
+        raise NamedError("{effects}: acts on a body; give {moments} or {body} instead of a molecule")
+    body: Body = subject.values["body"]
+    if motion.times is None:
+        raise NamedError("{times}: expected with {effects}, the start first: such as 0:10:101")
+    step = None
+    if motion.step is not None:
+        step = replace(MOTION["step"], reader=Quantity(body.units.time, above=0)).read(motion.step, entries.style)
+    if entries.has(MOTION["order"]) and step is None and entries.style != "key":
+        raise NamedError("{order}: belongs to a splitting; give {step} too")
+    spin, momentum = _spin_or_momentum(entries, body, start, motion)
+    return DrivenRequest(
+        body.moments, _times(entries, motion, body.units.time) or (), motion.effects, spin, momentum,
+        start.attitude or AT_REST, motion.tolerance, step, motion.order, body.units, body.axes, body.named,
+    )  # fmt: skip
+
+
+def _spin_or_momentum(
+    entries: Entries, body: Body, start: BodyInput, motion: MotionInput
+) -> tuple[Three | None, Three | None]:
+    """Initial ω or L; a named body has the default of its free motion."""
+    if start.angular_velocity is not None:
+        reader = Custom(lambda typed: three(typed, body.units.rate))
+        return replace(BODY["angular_velocity"], reader=reader).read(start.angular_velocity, entries.style), None
+    if motion.angular_momentum is not None:
+        field = replace(MOTION["angular_momentum"], reader=Custom(three))
+        return None, field.read(motion.angular_momentum, entries.style)
+    if body.start is None:
+        raise NamedError(
+            "{angular_velocity}: expected with {moments}, the angular velocity at the first time; or {angular_momentum}"
+        )
+    return None, body.start[0]

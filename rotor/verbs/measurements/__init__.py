@@ -1,0 +1,1 @@
+"""Inputs of verbs on measurements: observed spectra, models over them, measured lines."""

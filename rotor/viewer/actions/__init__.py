@@ -1,0 +1,1 @@
+"""Actions of the page of `rotor view` on lines, species and fits."""
