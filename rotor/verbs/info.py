@@ -202,4 +202,5 @@ VERB = Verb(
     drawn=None,
     accuracy="of the rotational constants",
     start={"molecule": "water", "outputs.csv": "q.csv"},
+    small_blocks=True,
 )  # fmt: skip

@@ -2,11 +2,13 @@
 
 import json
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rotor
+from rotor.cli import declaration
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.rotation import hamiltonian
@@ -107,3 +109,27 @@ def test_sums_at_temperatures_that_nobody_typed_are_left_out_where_they_are_long
         {"A": 9400.0, "B": 3100.0, "C": 2500.0, "E[1]": 6e4, "A[1]": 9480.0, "B[1]": 3090.0, "C[1]": 2497.0}
     )
     assert sums_module.is_quick(plain, 1000.0)  # states that nothing joins
+
+
+TURNING = """constants = { A = 9200.0, B = 3000.0, C = 2310.0 }
+[internal_rotation]
+frame = "PAM"
+F0 = 160000.0
+delta = 0.6
+V3 = 9e6
+"""
+
+
+def test_long_sums_over_levels_of_a_methyl_group_are_left_out(call, folder):
+    """Q at 1000 K takes minutes there. Only temperatures that were typed are summed so far."""
+    Path("top.toml").write_text(TURNING)
+    code, shown, _ = call("info", "top.toml", "--json", "info.json")
+    assert code == 0
+    rows = json.loads(Path("info.json").read_text())["partition_function"]
+    assert [row["temperature_k"] for row in rows if row["q"] is not None] == [9.375, 18.75, 37.5]
+    assert {row["source"] for row in rows[3:]} == {
+        "a long sum over levels of internal rotation; --temperature asks for it"
+    }
+    assert {row["classical"] for row in rows} == {None}  # that of the rigid top lacks the torsion
+    assert "a long sum over levels of internal rotation" in shown
+    assert declaration("info").small_blocks

@@ -33,6 +33,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.thermodynamics.sums.classical_limit import classical_limit
 from rotor.thermodynamics.sums.species import weights_in_species
 from rotor.thermodynamics.sums.trusted_levels import trusted_energies_mhz
+from rotor.tops.internal_rotation import sigma_species
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ MOST_J_DISTORTED = {
     "asymmetric": 800
 }  # with distortion all levels are solved, and up to two simpler approximations of them
 QUICK_PRODUCTS = 1e9  # Σ n³ of the diagonalizations, about 5e-9 s each
+QUICK_TURNING_PRODUCTS = 1e11  # the same for large blocks, of which populated functions are a part: about 3e-11 s each
 HIGHEST_KT = 80.0  # energy over kT above which rigid levels are left out: e⁻⁸⁰ of 10⁹ states is 1e-26
 JMAX_LIMIT = 4000
 AT_WORST = 0.1  # estimated relative error above which a sum is refused
@@ -185,16 +187,23 @@ def lowest_level_k(
 
 
 def is_quick(top: Top, temperature_k: float, relative_error: float = 1e-6) -> bool:
-    """Whether the sum at a temperature takes at most some seconds; blocks of S mixed states with (2J + 1)/4 levels each cost their cube.
+    """Whether the sum at a temperature takes at most some seconds; blocks cost their cube.
+
+    A J has four blocks of S mixed states with (2J + 1)/4 levels each; with internal rotation a block of 2J + 1 times the torsional
+    functions for each species.
 
     >>> from rotor.tops.top import Top
     >>> mixed = {"A": 9400.0, "B": 3100.0, "C": 2500.0, "E[1]": 6e4, "A[1]": 9480.0, "B[1]": 3090.0, "C[1]": 2497.0, "G_c[0,1]": 450.0}
     >>> [is_quick(Top.from_constants(mixed), kelvin) for kelvin in (75.0, 300.0)]
     [True, False]
     """
-    if top.states is None or not top.states.couplings:
+    turning = top.internal_rotation
+    if turning is None and (top.states is None or not top.states.couplings):
         return True
     last = float(_last_j(top, np.array([temperature_k]), relative_error)[0])
+    if turning is not None:  # the sum over J of (2J functions)³
+        return len(sigma_species(turning.tops)) * 2 * last**4 * turning.functions**3 <= QUICK_TURNING_PRODUCTS
+    assert top.states is not None
     return (top.states.count * last) ** 3 * last / 8 <= QUICK_PRODUCTS  # 4 blocks per J: the sum over J of 4 (S J/2)³
 
 

@@ -47,7 +47,7 @@ def partition_table(
 ) -> list[dict[str, Any]]:
     """Q summed and classical at each temperature; without a sum `q` is None and `source` says why.
 
-    quick: skip sums over levels of mixed states that take longer than some seconds.
+    quick: skip sums over levels of mixed states or internal rotation that take longer than some seconds.
 
     >>> from rotor.tops.top import Top
     >>> [round(row["q"], 2) for row in partition_table(Top.from_constants("B=57635.968 MHz"), [10.0, 300.0])]
@@ -85,8 +85,13 @@ def _row_alone(top: Top, temperature_k: float) -> dict[str, Any]:
 
 
 def _long_row(top: Top, temperature_k: float) -> dict[str, Any]:
-    classical_facts = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
-    return _without_sum(classical_facts, "a long sum over levels of states that mix; --temperature asks for it")
+    turning = top.internal_rotation is not None
+    classical_facts = {
+        "temperature_k": temperature_k,
+        "classical": None if turning else classical_partition_function(top, temperature_k),
+    }
+    what = "internal rotation" if turning else "states that mix"
+    return _without_sum(classical_facts, f"a long sum over levels of {what}; --temperature asks for it")
 
 
 def _without_sum(facts: dict[str, Any], reason: str) -> dict[str, Any]:
