@@ -200,7 +200,15 @@ def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
     try:
         return constants.replace(**dict.fromkeys(missing, 0.0)) if missing else constants
     except UnknownConstantError as error:
+        for name in missing:
+            if near := [known for known in constants.values if _plain(known) == _plain(name)]:
+                raise ValueError(f"{name} is not a constant of the start; did you mean {' or '.join(near)}?") from None
         raise ValueError(f"{error}; {_FURTHER}") from None
+
+
+def _plain(name: str) -> str:
+    """A name without spins, states, underscores and case, to compare what was typed: chi_aa(14N) and chiaa are alike."""
+    return re.split(r"[(\[]", name)[0].replace("_", "").casefold()
 
 
 def _spelled_as_in_set(name: str, constants: ConstantSet, where: str) -> str:

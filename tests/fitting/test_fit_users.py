@@ -374,6 +374,49 @@ def test_a_table_with_other_signs_between_its_columns_is_named(call, folder, see
     assert words.replace("\\\\", "\\") in err
 
 
+TURNING = """constants = { A = 9200.0, B = 3000.0, C = 2310.0 }
+dipole = { a = 1.5, b = 1.0 }
+[spins.14N]
+chi_aa = 1.9
+[internal_rotation]
+frame = "PAM"
+F0 = 160000.0
+delta = 0.6
+V3 = 9e6
+"""
+
+
+def test_a_fit_of_a_methyl_group_names_what_was_meant_and_what_is_not_written(call, folder):
+    """Names typed nearly right, a table separated by semicolons, and the files of SPFIT, which has no internal rotation."""
+    (folder / "top.toml").write_text(TURNING)
+    assert (
+        call("spectrum", "top.toml", "--jmax", "3", "--temperature", "2", "--hyperfine", "--csv", "lines.csv")[0] == 0
+    )
+    names = (folder / "lines.csv").read_text().splitlines()[0].split(",")
+    kept = [i for i, name in enumerate(names) if (name.endswith(("_upper", "_lower")) and name != "g_upper") or i == 0]
+    rows = [line.split(",") for line in (folder / "lines.csv").read_text().splitlines()]
+    table = [",".join([*(row[i] for i in kept), "error_mhz" if n == 0 else "0.001"]) for n, row in enumerate(rows)]
+    (folder / "seen.csv").write_text("\n".join(table) + "\n")
+    (folder / "semicolons.csv").write_text("\n".join(table).replace(",", ";") + "\n")
+    for free, meant in (("A,V_3", "V3"), ("A,chi_aa", "chi_aa(14N)"), ("A,DJ,v3", "V3")):
+        code, _, err = call("fit", "seen.csv", "--start", "top.toml", "--free", free)
+        assert (code, f"did you mean {meant}?" in err) == (2, True), err
+    code, _, err = call("fit", "semicolons.csv", "--start", "top.toml", "--free", "A")
+    assert (code, "its columns are separated by ';'; expected commas" in err) == (2, True), err
+    code, _, err = call("fit", "seen.csv", "--start", "top.toml", "--free", "A,B,C", "--out", "fitted")
+    assert (code, "fitted.par, fitted.var are not written: internal rotation: SPFIT's" in err) == (0, True), err
+
+
+def test_constants_of_spins_and_states_among_those_of_the_rotation_name_their_option(call):
+    for name, option in (
+        ("chi_aa(14N)", "--spin-constants"),
+        ("E[1]", "--state-constants"),
+        ("chi_aa", "--spin-constants"),
+    ):
+        code, _, err = call("spectrum", "--constants", f"A=9 B=4 C=3 GHz {name}=2 MHz", "--dipole-abc", "1,0,0")
+        assert (code, option in err) == (2, True), err
+
+
 def write_csv(path, lines: Assignments) -> None:
     rows = zip(lines.upper.tolist(), lines.lower.tolist(), lines.frequency_mhz.tolist(), strict=True)
     path.write_text(HEAD + "".join(f"{','.join(map(str, [*u, *low]))},{f:.5f},0.003\n" for u, low, f in rows))

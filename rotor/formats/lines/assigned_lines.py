@@ -333,7 +333,7 @@ def _refuse_columns(
     path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], accepted: set[str]
 ) -> None:
     """Raise ValueError for missing or unknown columns."""
-    other = next((sign for sign in (";", "\t") if len(columns) == 1 and sign in columns[0]), None)
+    other = next((sign for sign in (";", "\t") if columns and sign in columns[0]), None)
     if other is not None:
         raise ValueError(
             f"{path}: its columns are separated by {other!r}; expected commas, and a point in decimal numbers"

@@ -320,7 +320,10 @@ def _refuse_unknown(names: Iterable[str]) -> None:
             if re.fullmatch("mu_?[abc]", name):
                 hint = "the dipole is not a rotational constant; molecule files have dipole = { a = 1.0 }, some commands --dipole. "
             elif _SPIN_OR_STATE.match(name):
-                hint = "constants of spins and of further states belong to a Top, as spin_constants and states, such as chi_aa(14N). "
+                hint = (
+                    "constants of spins and of further states are given beside these: --spin-constants 'chi_aa(14N)=-4.2 MHz' and "
+                    "--state-constants, in Python spin_constants and states. "
+                )
             raise UnknownConstantError(
                 f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {first_names(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"

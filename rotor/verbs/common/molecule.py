@@ -236,6 +236,9 @@ def _from_constants(reading: Reading) -> Top:
 
     text = reading.inputs.constants or ""
     with within(reading.named("constants")):
+        if bracketed := re.search(r"(\w[\w-]*[(\[][^()\[\]=]*[)\]](?:\[\d+\])?)\s*=", text):
+            other = "spin_constants" if "(" in bracketed[1] else "state_constants"
+            raise ValueError(f"{bracketed[1]} is not a rotational constant; give it with {reading.named(other)}")
         top = Top.from_constants(text, source=reading.source("constants"))
     if reading.style == "option" and not has_unit(text) and max(top.constants.values.values()) < USUAL_LEAST_MHZ:
         reading.note(

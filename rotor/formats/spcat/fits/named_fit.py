@@ -49,6 +49,8 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     if isinstance(fit.named, TopConstants) and fit.named.in_field:
         raise ValueError("lines in an electric field: SPFIT's files have none")
     named = fit.named if isinstance(fit.named, TopConstants) else TopConstants(Top.from_constants(fit.named))
+    if named.top.internal_rotation is not None:
+        raise ValueError("internal rotation: SPFIT's files have no such constants; the .toml holds everything")
     file, codes = named_parameters(named, title, min(highest, 359))  # 359 is SPCAT's largest KNMAX
     matrix: Floats = np.asarray(np.linalg.pinv(codes), dtype=np.float64)
     back = codes @ fit.parameters.matrix  # derivatives of SPFIT's parameters by the free constants
