@@ -241,7 +241,7 @@ def test_what_a_mapping_refuses():
         Top.from_constants(NAMED)
     with pytest.raises(ValueError, match="spin_constants: given among the constants and again"):
         Top.from_constants(NAMED, spin_constants="chi_aa(14N)=1 MHz", spins="S=1/2")
-    with pytest.raises(ValueError, match="--spin-constants .* in Python spin_constants and states"):
+    with pytest.raises(ValueError, match=r"--spin-constants .* in Python spin_constants and states"):
         Constants(A=9400.0, B=3100.0, C=2500.0, chi_aa=3.0)
 
 
