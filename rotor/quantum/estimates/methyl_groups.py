@@ -1,28 +1,9 @@
 """Methyl groups of a geometry, and their barriers from similar molecules.
 
-The barrier V3 follows from the atom that bears the group and its neighbours. Each value is that of one molecule; other molecules of the
-same kind agree within a factor of about 2 (marked ~: less well). The A - E splitting of lines scales about as exp(-1.3 √(V3/F)): a barrier
-that is 50 % too high makes it four to ten times too small. For groups missing from the table, the free-rotor value F is reported as an
-upper bound.
-
-| group | V3, cm⁻¹ | of | where it was read |
-|---|---|---|---|
-| CH3-OH | 373.9 | methanol with ¹⁷O | 2 · 186.94207, Astron. Astrophys. 2024, aa51011-24, table A.1 |
-| CH3-O-C=O | 370.9 | methyl formate | Astron. Astrophys. 500 (2009) 1109, table 2 |
-| CH3-O- other | 879 | methyl propargyl ether | 2512 cal/mol, J. Mol. Struct. 32 (1976) 191, abstract |
-| CH3-S-C=O | 127.5 | S-methyl thioformate | Astron. Astrophys. 644 (2020) A102, abstract |
-| CH3-S-C other | 753 | dimethyl sulfide | 736.17 in Ar-(CH3)2S is 97.8 % of it, J. Mol. Spectrosc. 257 (2009) 11, abstract |
-| CH3-SH | 445 | methanethiol | from 0.653 cm⁻¹, the amplitude over K, Int. Symp. Mol. Spectrosc. 2016, hdl 2142/91207 |
-| CH3-NH2, amines | 691 | methylamine | abstract of K. Takagi and T. Kojima, J. Phys. Soc. Japan, as paperexplained.cn has it |
-| CH3-CH=O | 407.6 | acetaldehyde | Astron. Astrophys. 579 (2015) A46, table 1 |
-| CH3-C(=O)O | 170 | acetic acid | 138.45 in its monohydrate is 18.7 % less, Int. Symp. Mol. Spectrosc. 63 (2008), abstract p101 |
-| CH3-C(=O)C ~ | 302 | 2-acetyl-5-methylthiophene | Phys. Chem. Chem. Phys. 2023, d2cp03897h, abstract |
-| CH3-C=C | 688 | propene | NIST, Hydrocarbon Spectral Database, C3H6 |
-| CH3-CH=C= | 429 | methyl ketene | Astron. Astrophys. 619 (2018), aa33267-18, table A.2 |
-| CH3-C≡ | 1.0 | 2-butynoic acid | J. Mol. Spectrosc. 267 (2011) 186, abstract |
-| CH3- on a ring of six ~ | 0 | toluene: V6 = 4.88, V3 = 0 | 13.94 cal/mol, abstract of H. D. Rudolph et al. 1967 |
-| CH3- on a ring of five ~ | 248 | 2,5-dimethylthiophene | with 35 to 439 of others, scite.ai report on 2-methylthiazole |
-| CH3-C sp³ | 1108 | propane | NIST, Hydrocarbon Spectral Database, C3H8 |
+The barrier V3 follows from the atom that bears the group and its neighbours (`BARRIERS`). Each value is that of one molecule; other
+molecules of the same kind agree within a factor of about 2 (unsafe ones: less well). The A - E splitting of lines scales about as
+exp(-1.3 √(V3/F)): a barrier that is 50 % too high makes it four to ten times too small. For other groups, the free-rotor value F is
+reported as an upper bound.
 """
 
 from __future__ import annotations
@@ -70,6 +51,43 @@ class Barrier:
             return f"that of {self.molecule}"
         spread = "within a factor of about 2" if self.safe else "unsafe: it varies much among such molecules"
         return f"that of a similar molecule ({self.molecule}), {spread}"
+
+
+# by kind of group; the comment says where the value was read
+BARRIERS = {
+    # with ¹⁷O, 2 · 186.94207: Astron. Astrophys. 2024, aa51011-24, table A.1
+    "CH3-O-H": Barrier(373.9, "methanol", "CH4O"),
+    # Astron. Astrophys. 500 (2009) 1109, table 2
+    "CH3-O-C=O": Barrier(370.9, "methyl formate", "C2H4O2"),
+    # 2512 cal/mol: J. Mol. Struct. 32 (1976) 191, abstract
+    "CH3-O-C": Barrier(879.0, "methyl propargyl ether", "C4H6O"),
+    # from 0.653 cm⁻¹, the amplitude over K: Int. Symp. Mol. Spectrosc. 2016, hdl 2142/91207
+    "CH3-S-H": Barrier(445.0, "methanethiol", "CH4S"),
+    # Astron. Astrophys. 644 (2020) A102, abstract
+    "CH3-S-C=O": Barrier(127.5, "S-methyl thioformate", "C2H4OS"),
+    # 736.17 in Ar-(CH3)2S is 97.8 % of it: J. Mol. Spectrosc. 257 (2009) 11, abstract
+    "CH3-S-C": Barrier(753.0, "dimethyl sulfide", "C2H6S"),
+    # abstract of K. Takagi and T. Kojima, J. Phys. Soc. Japan, as paperexplained.cn has it
+    "CH3-N": Barrier(691.0, "methylamine", "CH5N"),
+    # Astron. Astrophys. 579 (2015) A46, table 1
+    "CH3-C(=O)H": Barrier(407.6, "acetaldehyde", "C2H4O"),
+    # 138.45 in its monohydrate is 18.7 % less: Int. Symp. Mol. Spectrosc. 63 (2008), abstract p101
+    "CH3-C(=O)O": Barrier(170.0, "acetic acid", "C2H4O2"),
+    # Phys. Chem. Chem. Phys. 2023, d2cp03897h, abstract
+    "CH3-C(=O)C": Barrier(302.0, "2-acetyl-5-methylthiophene", "C7H8OS", safe=False),
+    # NIST, Hydrocarbon Spectral Database, C3H6
+    "CH3-C=C": Barrier(688.0, "propene", "C3H6"),
+    # Astron. Astrophys. 619 (2018), aa33267-18, table A.2
+    "CH3-C=C=": Barrier(429.0, "methyl ketene", "C3H4O"),
+    # J. Mol. Spectrosc. 267 (2011) 186, abstract
+    "CH3-C≡": Barrier(1.0, "2-butynoic acid", "C4H4O2"),
+    # V6 = 4.88, 13.94 cal/mol: abstract of H. D. Rudolph et al. 1967
+    "CH3- on a ring of 6": Barrier(0.0, "toluene", "C7H8", safe=False),
+    # with 35 to 439 of others: scite.ai report on 2-methylthiazole
+    "CH3- on a ring of 5": Barrier(248.0, "2,5-dimethylthiophene", "C6H8S", safe=False),
+    # NIST, Hydrocarbon Spectral Database, C3H8
+    "CH3-C sp3": Barrier(1108.0, "propane", "C3H8"),
+}
 
 
 @dataclass(frozen=True)
@@ -133,60 +151,32 @@ def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Ba
     bearers = [i for i in bonds[carbon].tolist() if symbols[i] != "H"]
     if len(bearers) != 1:
         return None
-    bearer = bearers[0]
+    (bearer,) = bearers
     others = [i for i in bonds[bearer].tolist() if i != carbon]
     if symbols[bearer] == "C":
-        return _beside_carbon(molecule, bonds, bearer, others)
-    if symbols[bearer] in "OS" and len(others) == 1:
-        return _beside_chalcogen(symbols, bonds, bearer, others[0])
-    if symbols[bearer] == "N" and len(others) == 2 and not is_flat(molecule.positions_angstrom, bearer, bonds[bearer]):
-        return Barrier(691.0, "methylamine", "CH5N")
-    return None
-
-
-def _beside_chalcogen(symbols: Sequence[str], bonds: Sequence[Ints], bearer: int, other: int) -> Barrier | None:
-    """Barriers of alcohols, esters, ethers, thiols, thioesters and sulfides."""
-    acyl = symbols[other] == "C" and _doubly_bonded_oxygen(symbols, bonds, other)
-    if symbols[bearer] == "S":
-        if symbols[other] != "C":
-            return Barrier(445.0, "methanethiol", "CH4S") if symbols[other] == "H" else None
-        return Barrier(127.5, "S-methyl thioformate", "C2H4OS") if acyl else Barrier(753.0, "dimethyl sulfide", "C2H6S")
-    if symbols[other] == "H":
-        return Barrier(373.9, "methanol", "CH4O")
-    if symbols[other] != "C":
+        return BARRIERS.get(_kind_beside_carbon(symbols, bonds, bearer, others))
+    if symbols[bearer] == "N":
+        pyramidal = len(others) == 2 and not is_flat(molecule.positions_angstrom, bearer, bonds[bearer])
+        return BARRIERS["CH3-N"] if pyramidal else None
+    if len(others) != 1:
         return None
-    return Barrier(370.9, "methyl formate", "C2H4O2") if acyl else Barrier(879.0, "methyl propargyl ether", "C4H6O")
+    acyl = "=O" if symbols[others[0]] == "C" and _doubly_bonded_oxygen(symbols, bonds, others[0]) else ""
+    return BARRIERS.get(f"CH3-{symbols[bearer]}-{symbols[others[0]]}{acyl}")
 
 
-def _beside_carbon(molecule: Molecule, bonds: Sequence[Ints], bearer: int, others: list[int]) -> Barrier | None:
-    """Barriers beside a carbon, by its other neighbours."""
-    symbols = molecule.symbols
-    if len(others) == 3:
-        return Barrier(1108.0, "propane", "C3H8")
-    if len(others) == 1:
-        return Barrier(1.0, "2-butynoic acid", "C4H4O2")
+def _kind_beside_carbon(symbols: Sequence[str], bonds: Sequence[Ints], bearer: int, others: list[int]) -> str:
+    """The kind of a methyl group beside a carbon, by the other neighbours of that carbon."""
     if len(others) != 2:
-        return None
+        return {1: "CH3-C≡", 3: "CH3-C sp3"}.get(len(others), "")
     if _doubly_bonded_oxygen(symbols, bonds, bearer):
-        return _beside_acyl([symbols[i] for i in others if not (symbols[i] == "O" and len(bonds[i]) == 1)])
-    size = _ring(bonds, bearer, others)
-    if size in (5, 6):
-        return (
-            Barrier(0.0, "toluene", "C7H8", False)
-            if size == 6
-            else Barrier(248.0, "2,5-dimethylthiophene", "C6H8S", False)
-        )
+        third = [symbols[i] for i in others if not (symbols[i] == "O" and len(bonds[i]) == 1)]
+        return f"CH3-C(=O){''.join(third)}"
+    if (size := _ring(bonds, bearer, others)) >= 5:
+        return f"CH3- on a ring of {size}"
     if sorted(symbols[i] for i in others) not in (["C", "H"], ["C", "C"]):
-        return None
+        return ""
     cumulated = any(symbols[i] == "C" and len(bonds[i]) == 2 for i in others)
-    return Barrier(429.0, "methyl ketene", "C3H4O") if cumulated else Barrier(688.0, "propene", "C3H6")
-
-
-def _beside_acyl(others: list[str]) -> Barrier | None:
-    """Barriers beside C=O, by the third neighbour of the carbon."""
-    kinds = {"H": Barrier(407.6, "acetaldehyde", "C2H4O"), "O": Barrier(170.0, "acetic acid", "C2H4O2"),
-             "C": Barrier(302.0, "2-acetyl-5-methylthiophene", "C7H8OS", False)}  # fmt: skip
-    return kinds.get(others[0]) if len(others) == 1 else None
+    return "CH3-C=C=" if cumulated else "CH3-C=C"
 
 
 def _formula(symbols: Sequence[str]) -> str:
@@ -223,13 +213,8 @@ def is_flat(x: Floats, atom: int, near: Ints) -> bool:
 def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:
     """Whether an atom outside the group lies off the axis through its first atom; tested in batches of bounded memory."""
     for start in range(0, len(x), 1000):
-        rest = np.setdiff1d(np.arange(start, min(start + 1000, len(x))), group)
-        if len(rest) and (_sines(x[rest] - x[group[0]], axis) > OFF_AXIS).any():
+        rest = x[np.setdiff1d(np.arange(start, min(start + 1000, len(x))), group)] - x[group[0]]
+        across = np.linalg.norm(np.cross(rest, axis), axis=1)
+        if (across > OFF_AXIS * np.linalg.norm(rest, axis=1) * np.linalg.norm(axis)).any():
             return True
     return False
-
-
-def _sines(vectors: Floats, axis: Floats) -> Floats:
-    """Sines of the angles (n,) of vectors (n, 3) with an axis (3,)."""
-    lengths = np.linalg.norm(vectors, axis=1) * np.linalg.norm(axis)
-    return np.asarray(np.linalg.norm(np.cross(vectors, axis), axis=1) / lengths)
