@@ -1,10 +1,9 @@
 """The lowest states of real tridiagonal matrices at many fields at once: a linear or symmetric top in a static field.
 
-Energies at some fields, from LAPACK, are interpolated by quintics through energies, slopes and curvatures,
+Energies at some fields, from LAPACK, are interpolated by a polynomial in √(field - first field) with Chebyshev nodes, which are denser at
+weak fields, where energies bend most.
 
-    E' = ⟨i|H'|i⟩,   E'' = ⟨i|H''|i⟩ + 2 Σ_j |⟨j|H'|i⟩|²/(E_i - E_j).
-
-At all other fields they are improved with eigenvectors z from a twisted factorisation,
+At all fields they are improved with eigenvectors z from a twisted factorisation,
 
     λ ← λ + γ_k/|z|².
 
@@ -74,8 +73,7 @@ def _products(row: Ints, down: Floats, up: Floats, lower: Floats, upper: Floats)
 
 Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and the number of its lowest states to solve
 
-ANCHORS = 13  # fields solved by LAPACK
-DENSER = 1.5  # power of their spacing: they are denser at weak fields, where energies bend most
+ANCHORS = 15  # fields solved by LAPACK
 SWEEPS = 4  # most Rayleigh quotient iterations
 CONVERGED = 1e-8  # last change of an energy relative to the smallest gap; vectors have an error of this size, energies of its square
 # shift of energies before a sweep, relative to the largest element, so that no pivot is 0 at zero field
@@ -162,44 +160,18 @@ def _padded(chains: Sequence[tuple[Floats, ...]], size: int, strongest: float) -
 
 def _between_anchors(padded: Floats, fields: Floats, of: Ints, rank: Ints) -> tuple[Floats, Floats]:
     """Energies (fields, states) interpolated between anchor fields, and the smallest gap at these (states,)."""
-    places = np.unique(((len(fields) - 1) * np.linspace(0, 1, ANCHORS) ** DENSER).astype(int))
-    at, count = fields[places], int(rank.max()) + 1
-    powers = at[:, None] ** np.arange(padded.shape[1])
-    values, all_vectors = np.linalg.eigh(np.einsum("fp,cpij->cfij", powers, padded))
-    slopes, bends = _derivatives(padded, at, values, all_vectors, count)
-    gaps = np.diff(values[..., : count + 1], axis=2).min(axis=1)  # (chains, count) to the next state above
-    gaps = np.minimum(gaps, np.concatenate([gaps[:, :1], gaps[:, : gaps.shape[1] - 1]], axis=1)[:, : gaps.shape[1]])
-    gaps = np.concatenate([gaps, gaps[:, -1:]], axis=1)[:, :count]
-    heights, rises, curves = (table[of, :, rank].T for table in (values, slopes, bends))
-    return _joined(at, heights, rises, curves, fields), gaps[of, rank]
+    first, width = fields[0], fields[-1] - fields[0]
+    roots = (1 - np.cos(np.pi * np.arange(ANCHORS) / (ANCHORS - 1))) / 2
+    powers = (first + width * roots**2)[:, None] ** np.arange(padded.shape[1])
+    energies = np.linalg.eigvalsh(np.einsum("fp,cpij->cfij", powers, padded))
+    apart = np.pad(np.diff(energies, axis=2).min(axis=1), ((0, 0), (1, 1)), constant_values=np.inf)
+    gaps = np.minimum(apart[:, :-1], apart[:, 1:])  # (chains, n)
+    return lagrange(np.sqrt((fields - first) / width), roots) @ energies[of, :, rank].T, gaps[of, rank]
 
 
-def _derivatives(padded: Floats, at: Floats, values: Floats, vectors: Floats, count: int) -> tuple[Floats, Floats]:
-    """dE/dx and d²E/dx² of the lowest states (chains, points, count) from all states of each chain."""
-    powers = np.arange(padded.shape[1])
-    first = (powers * at[:, None] ** np.maximum(powers - 1, 0)) @ padded.reshape(*padded.shape[:2], -1)
-    second = (powers * (powers - 1) * at[:, None] ** np.maximum(powers - 2, 0)) @ padded.reshape(*padded.shape[:2], -1)
-    low, turned = vectors[..., :count], vectors.swapaxes(2, 3)
-    coupling = turned @ (first.reshape(vectors.shape) @ low)  # (chains, points, n, count)
-    above = values[..., None, :count] - values[..., :, None]
-    above[..., np.arange(count), np.arange(count)] = np.inf
-    slopes = np.diagonal(coupling, axis1=2, axis2=3)
-    bends = 2 * (coupling**2 / np.where(above == 0, np.inf, above)).sum(axis=2)
-    if second.any():
-        bends = bends + (low * (second.reshape(vectors.shape) @ low)).sum(axis=2)
-    return slopes, bends
-
-
-def _joined(at: Floats, values: Floats, slopes: Floats, bends: Floats, fields: Floats) -> Floats:
-    """Quintic interpolation of values, slopes and curvatures (points, states) at `at`: (fields, states)."""
-    place = np.clip(np.searchsorted(at, fields, "right") - 1, 0, len(at) - 2)
-    width = (at[place + 1] - at[place])[:, None]
-    t = (fields - at[place])[:, None] / width
-    start, bend = slopes[place] * width, bends[place] * width**2 / 2
-    rise = values[place + 1] - values[place] - start - bend
-    steeper = slopes[place + 1] * width - start - 2 * bend
-    rounder = bends[place + 1] * width**2 / 2 - bend
-    third = 10 * rise - 4 * steeper + rounder
-    fourth = 7 * steeper - 15 * rise - 2 * rounder
-    fifth = 6 * rise - 3 * steeper + rounder
-    return np.asarray(values[place] + t * (start + t * (bend + t * (third + t * (fourth + t * fifth)))))
+def lagrange(places: Floats, nodes: Floats) -> Floats:
+    """Factors (places, nodes) of the values at nodes in the polynomial through them."""
+    apart = places[:, None] - nodes
+    others = ~np.eye(len(nodes), dtype=bool)
+    above = np.array([apart[:, rest].prod(axis=1) for rest in others]).T
+    return np.asarray(above / np.array([(node - nodes[rest]).prod() for node, rest in zip(nodes, others, strict=True)]))

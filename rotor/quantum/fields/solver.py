@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.chains import chain_states, is_chain
+from rotor.quantum.fields.chains import chain_states, is_chain, lagrange
 
 Matrix = NDArray[Any]
 Terms = tuple[Matrix, ...]  # H_n (n, n)
@@ -246,21 +246,13 @@ class Interpolation:
                 overlaps = overlaps[:, alike]
             overlap = np.diagonal(overlaps)
             here *= (overlap / np.maximum(np.abs(overlap), TINY)).conj()
-        self.vectors, self.factors = vectors, _lagrange(fields, fields[anchors])
+        self.vectors, self.factors = vectors, lagrange(fields, fields[anchors])
 
     def at(self, place: int) -> Vectors:
         """Normalised vectors (n, n) at a field."""
         vectors = np.tensordot(self.factors[place], self.vectors, 1)
         vectors /= np.sqrt(np.einsum("nk,nk->k", vectors.conj(), vectors).real)
         return np.asarray(vectors)
-
-
-def _lagrange(fields: Floats, nodes: Floats) -> Floats:
-    """Factors (fields, nodes) of the values at nodes in the polynomial through them."""
-    apart = fields[:, None] - nodes
-    others = ~np.eye(len(nodes), dtype=bool)
-    above = np.array([apart[:, rest].prod(axis=1) for rest in others]).T
-    return np.asarray(above / np.array([(node - nodes[rest]).prod() for node, rest in zip(nodes, others, strict=True)]))
 
 
 def chebyshev_places(fields: Floats) -> Ints:
