@@ -76,7 +76,7 @@ def _symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
         lowest = np.exp(0.5 * (log_norm + plus * np.log1p(x) + minus * np.log1p(-x)))
     out = np.zeros((jmax - first + 1, len(x)))
     out[0] = lowest
-    diagonal, beside = cosine_bands(np.arange(first, jmax + 1), k, m)
+    diagonal, beside = cosine_bands(1, first, jmax, 1, k, m)
     for n in range(jmax - first):  # the three-term recurrence of Wigner functions in J
         before = beside[n - 1] * out[n - 1] if n else 0.0
         out[n + 1] = ((x - diagonal[n]) * out[n] - before) / beside[n]

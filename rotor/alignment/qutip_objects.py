@@ -313,5 +313,5 @@ def cosine_chain(jmax: int, k: int, m: int) -> Any:
     """
     import qutip
 
-    diagonal, beside = cosine_bands(np.arange(max(abs(k), abs(m)), jmax + 1), k, m)
+    diagonal, beside = cosine_bands(1, max(abs(k), abs(m)), jmax, 1, k, m)
     return qutip.qdiags([beside, diagonal, beside], [-1, 0, 1])

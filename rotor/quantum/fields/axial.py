@@ -1,12 +1,10 @@
 """Linear and symmetric tops in fields along Z: chains of J for each k and M, in closed form.
 
-With θ between the figure axis and Z, over symmetric-top functions |J k M⟩,
+With θ between the figure axis and Z, cosθ is the component 00 of D^1, and cos²θ = 1/3 + 2/3 D²_00. Over symmetric-top functions |J k M⟩
 
-    ⟨J-1 k M|cosθ|J k M⟩ = √[(J²-k²)(J²-M²)] / (J √(4J²-1)),     ⟨J k M|cosθ|J k M⟩ = kM / (J(J+1))
+    ⟨J' k M'|D^K_q0|J k M⟩ = c(J → J', 0, k) c(J → J', q, M) / √((2J'+1)(2J+1))
 
-(C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, table 4.4; Condon-Shortley phases in space, ⟨J k±1|Jx ∓ iJy|J k⟩
-positive in the molecule). k = 0 gives the functions of a linear molecule. cos²θ is the square of a matrix of cosθ with one more J, which
-makes it exact for the requested J.
+with c from `rotor.quantum.symmetric_top_elements`; k = 0 gives the functions of a linear molecule.
 """
 
 from __future__ import annotations
@@ -20,40 +18,30 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldOperator, FieldSpace, FreeLevels, Magnet, along
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import coupling, space_factor
+from rotor.quantum.symmetric_top_elements import coupling_to
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-def cosine_bands(j: Ints, k: int, m: int) -> tuple[Floats, Floats]:
-    """Diagonal (n,) and the band beside it (n-1,) of cosθ over successive J ≥ max(|k|, |M|).
-
-    >>> cosine_bands(np.arange(3), 0, 0)[1].round(6).tolist()  # 1/√3, 2/√15
-    [0.57735, 0.516398]
-    """
-    j = j.astype(np.float64)
-    diagonal = k * m / np.where(j > 0, j * (j + 1), 1.0)
-    up = j[1:]
-    return diagonal, np.sqrt((up**2 - k * k) * (up**2 - m * m) / (4 * up**2 - 1)) / up
-
-
-def cosine_squared_bands(j: Ints, k: int, m: int) -> tuple[Floats, Floats, Floats]:
-    """The diagonals of cos²θ with ΔJ = 0 (n,), 1 (n-1,) and 2 (n-2,) over successive J ≥ max(|k|, |M|).
-
-    >>> cosine_squared_bands(np.arange(2), 0, 0)[0].round(6).tolist()  # 1/3, 3/5
-    [0.333333, 0.6]
-    """
-    longer = np.append(j, j[-1] + 1)
-    d, b = cosine_bands(longer, k, m)
-    below = np.concatenate([[0.0], b[:-1]])  # J - 1 to J; zero for the first J
-    return d[:-1] ** 2 + below**2 + b**2, (b * (d[:-1] + d[1:]))[:-1], (b[:-1] * b[1:])[:-1]
+def _elements(rank: int, j: Ints, rise: int, k: int, m: int, q: int = 0) -> Floats:
+    """⟨J+rise k M+q|D^K_q0|J k M⟩ (n,) of rank K."""
+    in_body, in_space = coupling_to(j, rise, rank, 0, k), coupling_to(j, rise, rank, q, m)
+    return np.asarray(in_body * in_space / np.sqrt((2 * (j + rise) + 1.0) * (2 * j + 1.0)))
 
 
 @lru_cache(maxsize=4096)
-def _cosines(power: int, first: int, last: int, k: int, m: int) -> tuple[Floats, ...]:
-    """Bands of cosθ (power 1) or cos²θ (power 2) over J = first ... last."""
-    return (cosine_bands if power == 1 else cosine_squared_bands)(np.arange(first, last + 1), k, m)
+def cosine_bands(power: int, first: int, last: int, step: int, k: int, m: int) -> tuple[Floats, ...]:
+    """The main diagonal and the bands beside it of cosθ, or of cos²θ - 1/3, over J = first, first + step ... last.
+
+    >>> cosine_bands(1, 0, 2, 1, 0, 0)[1].round(6).tolist()  # 1/√3, 2/√15
+    [0.57735, 0.516398]
+    >>> (1 / 3 + cosine_bands(2, 0, 1, 1, 0, 0)[0]).round(6).tolist()  # 1/3, 3/5
+    [0.333333, 0.6]
+    """
+    size = 1.0 if power == 1 else 2 / 3
+    j = np.arange(first, last + 1, step)
+    return tuple(size * _elements(power, j[: len(j) - rise // step], rise, k, m) for rise in range(0, power + 1, step))
 
 
 @dataclass(frozen=True)
@@ -99,46 +87,28 @@ class AxialSpace(FieldSpace):
 
     def dense(self, block: FieldBlock, operator: FieldOperator) -> Floats:
         """The operator over the states of a block (n, n), real; a vector has no elements where even and odd J are separate."""
-        if isinstance(operator, Magnet):
-            return self._moment(block, operator.g)
-        size = len(block)
+        j, (k,), m, size = block.j, block.members, int(block.m), len(block)
+        if isinstance(operator, Magnet):  # g⊥ M + (g∥ - g⊥) k cosθ
+            on_diagonal = m * (np.trace(operator.g) - operator.g[self.axis, self.axis]) / 2
+            factor = k * along(operator.g, self.axis)
+        else:
+            on_diagonal = operator.scalar
+            factor = along(operator.body, self.axis) * along(operator.space, 2)
+        step = int(j[1] - j[0]) if size > 1 else 1
         out = np.zeros(size * size)
-        for n, band in enumerate(self._bands(block, operator)):
-            out[n : size * (size - n) : size + 1] = out[n * size :: size + 1] = band
+        for n, band in enumerate(cosine_bands(operator.rank, int(j[0]), int(j[-1]), step, k, m)):
+            out[n : size * (size - n) : size + 1] = out[n * size :: size + 1] = factor * band
+        out[:: size + 1] += on_diagonal
         return out.reshape(size, size)
-
-    def _bands(self, block: FieldBlock, contraction: Contraction) -> list[Floats]:
-        """Diagonals of the matrix over a block, the main one first; at most three."""
-        size = along(contraction.body, self.axis) * along(contraction.space, 2)
-        j, (k,), m = block.j, block.members, int(block.m)
-        first, apart = max(abs(k), abs(m)), len(j) > 1 and int(j[1] - j[0]) == 2
-        skip = int(j[0]) - first
-        bands = _cosines(contraction.rank, first, int(j[-1]), k, m)
-        if contraction.rank == 1:
-            return [] if apart else [size * band[skip:] for band in bands]
-        d, next_j, second_j = (band[skip:] for band in bands)
-        main = contraction.scalar + size * (d[:: 2 if apart else 1] - 1 / 3)
-        return [main, size * second_j[::2]] if apart else [main, size * next_j, size * second_j]
 
     def between(self, up: FieldBlock, operator: FieldOperator, low: FieldBlock) -> Floats:
         """Elements of T_q of a vector along the axis; the block of k stands for that of -k at M = 0."""
-        out = np.zeros((len(up), len(low)))
-        place, (k,) = {int(j): row for row, j in enumerate(up.j)}, up.members
+        out, (k,) = np.zeros((len(up), len(low))), up.members
         size = along(operator.body, self.axis) if isinstance(operator, Contraction) else 0.0
-        for column, j in enumerate(low.j.tolist()):
-            for above in (j - 1, j, j + 1):
-                if above in place:
-                    in_body = float(coupling(j, above, 1, 0, k))
-                    in_space = space_factor(2 * above, 2 * j, 1, low.twice_m, round(up.m - low.m))
-                    out[place[above], column] = size * in_body * in_space
+        for rise in (-1, 0, 1):
+            rows, columns = np.nonzero(up.j[:, None] == low.j + rise)
+            out[rows, columns] = size * _elements(1, low.j[columns], rise, k, int(low.m), round(up.m - low.m))
         return out
-
-    def _moment(self, block: FieldBlock, g: Floats) -> Floats:
-        """The magnetic moment g⊥ M + (g∥ - g⊥) k cosθ."""
-        across, (k,), m = (np.trace(g) - g[self.axis, self.axis]) / 2, block.members, int(block.m)
-        diagonal, beside = cosine_bands(block.j, k, m)
-        chain = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
-        return np.asarray(across * m * np.eye(len(block)) + (g[self.axis, self.axis] - across) * k * chain)
 
 
 def axial_levels(top: Top, jmax: int) -> FreeLevels:

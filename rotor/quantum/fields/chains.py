@@ -75,7 +75,7 @@ Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and the number 
 
 ANCHORS = 15  # fields solved by LAPACK
 SWEEPS = 4  # most Rayleigh quotient iterations
-CONVERGED = 1e-8  # last change of an energy relative to the smallest gap; vectors have an error of this size, energies of its square
+CONVERGED = 1e-9  # last change of an energy relative to the smallest gap; vectors have an error of this size, energies of its square
 # shift of energies before a sweep, relative to the largest element, so that no pivot is 0 at zero field
 OFF_ZERO = 1e-15
 TOGETHER = 1 << 19  # most numbers in memory where several chains are solved together

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -60,7 +60,7 @@ SPACE_AXES = "IIIr"  # x, y, z of a representation are a, b, c: those of space a
 
 
 class FieldSector(NamedTuple):
-    """States of a solved block: number of the block, places in it (None: all), rows among the levels, and twice F.
+    """States of a solved block: number of the block, places in it (None: all), rows among the levels, twice F, and their v_t.
 
     projections: Wang functions of M (a `WangBlock`) that multiply the states where M is mixed, M varying more slowly than the states.
     """
@@ -69,6 +69,7 @@ class FieldSector(NamedTuple):
     places: Ints | None
     rows: Ints
     twice_f: int
+    vt: int = 0
     projections: Any = None
 
 
@@ -129,34 +130,26 @@ class SolvedSpace(FieldSpace):
         return out
 
     def below(self, operator: FieldOperator) -> dict[int, list[tuple[int, int]]]:
-        """For each sector, those of equal or lower F that an operator connects, with 1 where elements lack a factor i, else 0."""
-        if operator.key_in_space not in self._below:
-            pairs: dict[int, list[tuple[int, int]]] = {}
-            for up, low, odd in self._pairs(operator):
-                pairs.setdefault(up, []).append((low, odd))
-            self._below[operator.key_in_space] = pairs
-        return self._below[operator.key_in_space]
+        """For each sector, those of equal or lower F that an operator connects, with 1 where elements lack a factor i, else 0.
 
-    def _pairs(self, operator: FieldOperator) -> Iterator[tuple[int, int, int]]:
-        """Pairs of sectors that an operator connects, with 1 where elements lack a factor i, else 0; all are real where M is mixed."""
+        Where M is good `blocks` tests the factor of M; all elements are real where M is mixed.
+        """
+        if operator.key_in_space in self._below:
+            return self._below[operator.key_in_space]
+        pairs = self._below[operator.key_in_space] = {}
+        lacks_i = self.m_is_good and operator.rank % 2 and not operator.time_odd
         for up, low in self.elements.connected(operator):
-            odd = self.m_is_good and operator.rank % 2 and not operator.time_odd and self.elements.blocks[low].combined
-            for a in self._sectors_of[up]:
-                for b in self._sectors_of[low]:
-                    if self._same_torsion(a, b) and (up != low or a >= b) and self._connects_m(operator, a, b):
-                        yield a, b, int(odd)
-
-    def _connects_m(self, operator: FieldOperator, a: int, b: int) -> bool:
-        """Whether an operator connects the functions of M of two sectors; by the factor of M, in `blocks`, where M is good."""
-        first, second = self.sectors[a].projections, self.sectors[b].projections
-        return self.m_is_good or self._space_tensor(operator).between(first, second) is not None
-
-    def _same_torsion(self, a: int, b: int) -> bool:
-        """Whether two sectors belong to the same v_t."""
-        vt = self.levels.quanta.get("vt")
-        if vt is None or self.sectors[a].places is None:
-            return True
-        return bool(vt[self.sectors[a].rows[0]] == vt[self.sectors[b].rows[0]])
+            odd = int(lacks_i and self.elements.blocks[low].combined)
+            for a, b in product(self._sectors_of[up], self._sectors_of[low]):
+                first, second = self.sectors[a], self.sectors[b]
+                if first.vt != second.vt or (up == low and a < b):
+                    continue
+                if (
+                    self.m_is_good
+                    or self._space_tensor(operator).between(first.projections, second.projections) is not None
+                ):
+                    pairs.setdefault(a, []).append((b, odd))
+        return pairs
 
     @cached_property
     def _sectors_of(self) -> dict[int, list[int]]:
@@ -218,10 +211,9 @@ class SolvedSpace(FieldSpace):
 
     def dense(self, block: FieldBlock, operator: FieldOperator) -> NDArray[Any]:
         """The operator over the states of a block (n, n), real symmetric or complex Hermitian."""
-        out: NDArray[Any] = np.diag(np.full(len(block), operator.scalar))
-        for rows, columns, elements in self._placed_elements(block, operator, block, triangle=True):
-            if elements.dtype != out.dtype and elements.dtype == np.complex128:
-                out = out.astype(np.complex128)
+        placed = list(self._placed_elements(block, operator, block, triangle=True))
+        out = np.diag(np.full(len(block), operator.scalar, np.result_type(float, *(part for _, _, part in placed))))
+        for rows, columns, elements in placed:
             out[rows, columns] += elements
             if rows != columns:
                 out[columns, rows] += elements.conj().T
@@ -321,7 +313,7 @@ def _sectors(levels: Levels) -> Iterator[FieldSector]:
             continue
         for value in np.unique(vt[rows]).tolist():
             places = np.flatnonzero(vt[rows] == value)
-            yield FieldSector(number, places, rows[places], block.twice_total)
+            yield FieldSector(number, places, rows[places], block.twice_total, value)
 
 
 def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:
@@ -383,10 +375,10 @@ def tilted_space(
     top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
 ) -> SolvedSpace:
     """The space of a top for fields of any direction; ValueError for spins, internal rotation and magnetic fields."""
-    if any(effect.spins(top) for effect in effects):
-        raise ValueError("a top with spins is solved in fields along Z alone; leave out the angle")
-    if top.internal_rotation is not None:
-        raise ValueError("a top with internal rotation is solved in fields along Z alone; leave out the angle")
+    has_spins = any(effect.spins(top) for effect in effects)
+    if has_spins or top.internal_rotation is not None:
+        what = "spins" if has_spins else "internal rotation"
+        raise ValueError(f"a top with {what} is solved in fields along Z alone; leave out the angle")
     if not all(isinstance(operator, Contraction) for operator in operators):
         raise ValueError("a magnetic field is solved along Z only")
     levels = solved_levels(top, jmax, effects)
@@ -394,7 +386,11 @@ def tilted_space(
     projections = {j: wang_blocks(j, SPACE_AXES) for j in range(jmax + 1)}
     sectors = tuple(
         FieldSector(
-            number, None, np.tile(block.start + np.arange(len(block.energies_mhz)), wang.size), block.twice_total, wang
+            number,
+            None,
+            np.tile(block.start + np.arange(len(block.energies_mhz)), wang.size),
+            block.twice_total,
+            projections=wang,
         )
         for number, block in enumerate(elements.blocks)
         for wang in projections[block.twice_total // 2]
