@@ -155,7 +155,11 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
 
     Raises ValueError if `jmax` is too small, or if J of 300 is not enough.
     """
-    chosen = smallest_jmax(request, executor) if jmax is None else _checked_jmax(request, jmax)
+    if jmax is not None and jmax < request.j_highest + EDGE:
+        raise ValueError(
+            f"J max {jmax}: states up to J = {request.j_highest} are followed; give at least {request.j_highest + EDGE}"
+        )
+    chosen = smallest_jmax(request, executor) if jmax is None else jmax
     while True:
         states = _tabulated(request, chosen, executor)
         error = float(np.nanmax(states.truncation_mhz, initial=0.0))
@@ -163,28 +167,14 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
         if error <= request.tolerance_mhz and leaked <= request.most_at_edge:
             return states
         if jmax is not None:
-            raise ValueError(_too_small(request, jmax, error, leaked))
+            reason = (
+                f"the error of an energy may be {error:.3g} MHz, more than {request.tolerance_mhz:g}"
+                if error > request.tolerance_mhz
+                else f"a state has {leaked:.2g} of its population in the two highest J, more than {request.most_at_edge:g}"
+            )
+            raise ValueError(f"J max {jmax} is too small: {reason}; give a higher J max, or none and it is chosen")
         chosen += 1 if error > request.tolerance_mhz else 2
         _check_highest(chosen)
-
-
-def _checked_jmax(request: MapRequest, jmax: int) -> int:
-    """J max, or ValueError if it is too low for the states of the map."""
-    if jmax < request.j_highest + EDGE:
-        raise ValueError(
-            f"J max {jmax}: states up to J = {request.j_highest} are followed; give at least {request.j_highest + EDGE}"
-        )
-    return jmax
-
-
-def _too_small(request: MapRequest, jmax: int, error: float, leaked: float) -> str:
-    """Message that explains why J max is too small."""
-    reason = (
-        f"the error of an energy may be {error:.3g} MHz, more than {request.tolerance_mhz:g}"
-        if error > request.tolerance_mhz
-        else f"a state has {leaked:.2g} of its population in the two highest J, more than {request.most_at_edge:g}"
-    )
-    return f"J max {jmax} is too small: {reason}; give a higher J max, or none and it is chosen"
 
 
 def _check_highest(jmax: int) -> None:
@@ -214,9 +204,8 @@ def _smallest_between(request: MapRequest, lowest: int, highest: int, executor: 
     if executor is not None:
         enough = each_block(request, highest, partial(_smallest_of_block, request, lowest, highest), executor)
         return max(enough, default=lowest)
-    for block in reversed(
-        blocks_of_map(request, highest)
-    ):  # small blocks of large |M| show soonest that `highest` is too low
+    # small blocks of large |M| show soonest that `highest` is too low
+    for block in reversed(blocks_of_map(request, highest)):
         lowest = _smallest_of_block(request, lowest, highest, block)
         if lowest > highest:
             break
@@ -317,38 +306,32 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
     inside, levels = terms_over(terms, states.places), block.levels
     labels = np.array([levels.label(int(row)) for row in states.rows])
     followed = states.j <= request.j_highest
-    listed, diabatic = followed, {}
+    listed, diabatic = followed, dict[str, NDArray[Any]]()
     if request.diabatic_gap_mhz is not None:
         ranks = _diabatic_ranks(request, inside, len(labels), request.diabatic_gap_mhz)
-        listed, diabatic = followed | followed[ranks].any(axis=0), {"diabatic_label": labels[ranks]}
-    vectors = states.vectors[:, :, listed]
-    of_listed = {
-        "slope": 0.0 - derivatives(inside, fields, vectors) / request.kind.slope_mhz,  # without field 0, not -0
-        "edge_population": (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1),
-    }
-    for name, operator in request.observables.items():
-        of_listed[name] = expectation(over(block.space.dense(block, operator), states.places), vectors)
-    by_field = {"energy_mhz": states.energies, "truncation_mhz": np.where(followed, states.error, np.nan)} | diabatic
-    of_listed |= {name: values[:, listed] for name, values in by_field.items()}
-    by_state = {
-        "rank": np.arange(len(labels)),
-        "label": labels,
-        "free_mhz": levels.energy_mhz[states.rows],
-        "weight": levels.weight[states.rows],
-    }
-    by_block = {
+        listed = followed | followed[ranks].any(axis=0)
+        diabatic = {"diabatic_label": labels[ranks][:, listed]}
+    vectors, rows = states.vectors[:, :, listed], states.rows[listed]
+    columns = {  # (fields, states), or less where they are equal
+        "field": fields[:, None],
         "m": block.m,
         "block": block.label,
         "copies": block.copies,
         "round_off_mhz": round_off_mhz(terms, fields),
+        "rank": np.flatnonzero(listed),
+        "label": labels[listed],
+        "free_mhz": levels.energy_mhz[rows],
+        "weight": levels.weight[rows],
+        "energy_mhz": states.energies[:, listed],
+        "truncation_mhz": np.where(followed, states.error, np.nan)[:, listed],
+        "slope": 0.0 - derivatives(inside, fields, vectors) / request.kind.slope_mhz,  # without field 0, not -0
+        "edge_population": (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1),
+        **diabatic,
     }
-    count = int(listed.sum())
-    return {
-        "field": np.tile(fields, count),
-        **{name: np.full(count * len(fields), value) for name, value in by_block.items()},
-        **{name: np.repeat(values[listed], len(fields)) for name, values in by_state.items()},
-        **{name: values.T.ravel() for name, values in of_listed.items()},
-    }
+    for name, operator in request.observables.items():
+        columns[name] = expectation(over(block.space.dense(block, operator), states.places), vectors)
+    shape = len(fields), len(rows)
+    return {name: np.broadcast_to(values, shape).T.ravel() for name, values in columns.items()}
 
 
 def _diabatic_ranks(request: MapRequest, terms: Terms, count: int, gap_mhz: float) -> Ints:
