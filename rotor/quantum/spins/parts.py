@@ -129,27 +129,16 @@ def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, F
 
 
 def over_functions(columns: PartColumns, blocks: Sequence[int], vectors: Floats) -> Floats:
-    """Vectors (blocks, n, n) over rotational functions instead of states; unchanged if each state belongs to one Wang block anyway."""
+    """Vectors (blocks, n, n) over functions by sub-block; unchanged if each rotational state belongs to one Wang block anyway."""
     if columns.single_states:
         return vectors
-    pairs = zip(blocks, vectors, strict=True)
-    return np.stack(
-        [
-            np.concatenate([_over_functions(part, vectors_of_block) for part in columns.block_parts(block)])
-            for block, vectors_of_block in pairs
-        ]
-    )
-
-
-def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
-    """Vectors of one part over rotational functions, by Wang block, then pattern; unchanged for a single Wang block."""
-    if len(part.rotor.parts) == 1:
-        return vectors[part.place]
-    each, n = part.rows(vectors), vectors.shape[1]
-    if part.rotor.moments is not None:  # states of a species are functions by themselves
-        return each.swapaxes(0, 1).reshape(-1, n)
-    each = np.matmul(part.rotor.vectors, each)
-    return np.concatenate([each[:, wang_part.place].reshape(-1, n) for wang_part in part.rotor.parts])
+    out = np.empty_like(vectors)
+    for place, block in enumerate(blocks):
+        parts, of_block = columns.block_parts(block), vectors[place]
+        if parts[0].rotor.moments is None:  # states of a species are functions by themselves
+            of_block = turned(parts, of_block, {part.number: part.rotor.vectors for part in parts})
+        out[place] = of_block[functions_by_sub_block(parts)]
+    return out
 
 
 def turned(parts: Sequence[SpinPart], columns: Floats, matrices: Mapping[int, Floats]) -> Floats:
@@ -161,11 +150,10 @@ def turned(parts: Sequence[SpinPart], columns: Floats, matrices: Mapping[int, Fl
 
 def functions_by_sub_block(parts: Sequence[SpinPart]) -> Ints:
     """Places of the functions of a block sub-block by sub-block."""
-    pieces = []
+    pieces = list[Ints]()
     for part in parts:
-        firsts = part.place.start + len(part.rotor.energies_mhz) * np.arange(part.repeats)
-        for wang_part in part.rotor.parts:
-            pieces.append((firsts[:, None] + np.arange(wang_part.place.start, wang_part.place.stop)).ravel())
+        functions = np.arange(part.place.start, part.place.stop).reshape(part.repeats, -1)
+        pieces += [functions[:, wang_part.place].ravel() for wang_part in part.rotor.parts]
     return np.concatenate(pieces)
 
 
