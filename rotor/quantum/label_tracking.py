@@ -69,30 +69,27 @@ class NamedFunctions(NamedTuple):
 Naming = Callable[[Sequence[tuple[int, WangBlock]], str], NamedFunctions]  # states and Wang blocks, representation
 
 
-class AtStart(NamedTuple):
-    """What labels of a block had when they were looked for: parameters of the block, energies, derivatives by them, sub-blocks of all
-    its states and the shares of these."""
-
-    values_mhz: Floats
-    energies: Floats
-    slopes: Floats
-    leading: Ints
-    shares: Floats
-
-
 NamedBlock = tuple[LinearBlock, NamedFunctions]
 """A block of which states have names, and how."""
 
 
 class Tracked(NamedTuple):
-    """Labels in a block: their places among all, the names and the states that they have."""
+    """Labels in a block: their places among all labels, their names and states.
+
+    At the start: values of the parameters of the block, energies of the labels and their derivatives, and of all states the sub-block with
+    the largest share and this share.
+    """
 
     block: LinearBlock
     named: NamedFunctions
     rows: Ints
     names: Ints
     states: Ints
-    start: AtStart
+    values_mhz: Floats
+    energies: Floats
+    slopes: Floats
+    leading: Ints
+    shares: Floats
 
 
 def tracked_blocks(
@@ -125,10 +122,10 @@ def tracked_blocks(
         for place, (rows, states) in enumerate(tracked_rows):
             if len(rows):
                 block, named = blocks[numbers[place]]
-                block_rows = slopes[place, : len(rows), : len(block.parameters)]
-                leading_of_states = leading[place, : block.size], shares[place, : block.size]
-                start = AtStart(values_mhz[block.parameters], energies[place, states], block_rows, *leading_of_states)
-                tracked.append(Tracked(block, named, rows, state_names[place][states], states, start))
+                block_slopes = slopes[place, : len(rows), : len(block.parameters)]
+                start = values_mhz[block.parameters], energies[place, states], block_slopes
+                sub_blocks = leading[place, : block.size], shares[place, : block.size]
+                tracked.append(Tracked(block, named, rows, state_names[place][states], states, *start, *sub_blocks))
     return TrackedLevels(tuple(names), count, tuple(tracked))
 
 
@@ -190,7 +187,7 @@ class _Labelled:
         stack = LinearStack.from_blocks([each.block for each in tracked])
         members = _members([each.named.sub_blocks for each in tracked], stack.size)
         rows, states = _padded([each.rows for each in tracked], -1), _padded([each.states for each in tracked], 0)
-        return cls(stack, members, tuple(tracked), rows, states, _padded([each.start.leading for each in tracked], 0))
+        return cls(stack, members, tuple(tracked), rows, states, _padded([each.leading for each in tracked], 0))
 
     @cached_property
     def _at_start(self) -> Ints:
@@ -222,7 +219,7 @@ class _Labelled:
 
     @cached_property
     def _unclear_at_start(self) -> NDArray[np.bool_]:
-        shares = [np.pad(block.start.shares, (0, self.stack.size - block.block.size)) for block in self.tracked]
+        shares = [np.pad(block.shares, (0, self.stack.size - block.block.size)) for block in self.tracked]
         return self._unclear(self.leading, np.stack(shares))
 
     def _unclear(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
@@ -354,7 +351,7 @@ class TrackedLevels(LevelModel):
         return energies, slopes
 
     def _tracked_levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        if all(np.array_equal(block.start.values_mhz, values_mhz[block.block.parameters]) for block in self.tracked):
+        if all(np.array_equal(block.values_mhz, values_mhz[block.block.parameters]) for block in self.tracked):
             return self._levels_at_start(len(values_mhz))
         energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place
         slopes = np.zeros((self.count + 1, len(values_mhz) + 1))
@@ -367,8 +364,8 @@ class TrackedLevels(LevelModel):
     def _levels_at_start(self, parameters: int) -> tuple[Floats, Floats]:
         energies, slopes = np.full(self.count, np.nan), np.zeros((self.count, parameters))
         for block in self.tracked:
-            energies[block.rows] = block.start.energies
-            slopes[block.rows[:, None], block.block.parameters] = block.start.slopes
+            energies[block.rows] = block.energies
+            slopes[block.rows[:, None], block.block.parameters] = block.slopes
         return energies, slopes
 
 

@@ -217,7 +217,7 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
     if not abs(up.j - low.j) <= tensor.rank <= up.j + low.j:
         return []
     rank, (steps, parts) = tensor.rank, tensor.signed_parts(up, low)
-    out = []
+    out, folded = [], folded_places(up.first_k, low.first_k, rank)
     for step in steps:
         source, target = overlap(up, low, step)
         if source.start >= source.stop:
@@ -225,8 +225,10 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
         table = _coupling_table(low.j // _J_AT_ONCE, up.j - low.j, rank, step)
         k = slice(low.first_k + 2 * source.start, low.first_k + 2 * source.stop, 2)
         elements = table[low.j % _J_AT_ONCE, k] * parts[rank + step]
-        for place, value in _folded(up, low, rank, step, parts) if rank > 1 else ():
-            elements[place - source.start] += value
+        for row, column, k_up, k in folded:
+            if k_up - k == step and row < up.size and column < low.size:
+                turned = float(coupling(low.j, up.j, rank, k_up + k, -k))
+                elements[column - source.start] += low.sign * turned * parts[rank + k_up + k]
         out.append(Band(source, target, elements))
     return out
 
@@ -247,14 +249,11 @@ def _coupling_table(number: int, rise: int, rank: int, step: int) -> Floats:
     return out
 
 
-def _folded(up: WangBlock, low: WangBlock, rank: int, step: int, parts: list[float]) -> list[tuple[int, float]]:
-    """Places in the lower block and values of s X(K', -K), K' = K + step, where 1 ≤ K, K' and K + K' ≤ rank."""
-    out = []
-    for k in range(max(low.first_k, 1, 1 - step), (rank - step) // 2 + 1):
-        if (k - low.first_k) % 2 == 0 and k <= low.j and up.first_k <= k + step <= up.j and parts[rank + 2 * k + step]:
-            factor = float(coupling(low.j, up.j, rank, 2 * k + step, -k))
-            out.append(((k - low.first_k) // 2, low.sign * factor * parts[rank + 2 * k + step]))
-    return out
+@lru_cache(maxsize=256)
+def folded_places(first_up: int, first_low: int, rank: int) -> tuple[tuple[int, int, int, int], ...]:
+    """Row, column, K' and K of the elements that s X(K', -K) is added to, from the first K of both blocks: 1 ≤ K, K' and K + K' ≤ rank."""
+    all_k = [(k_up, k) for k_up in range(first_up, rank, 2) for k in range(first_low, rank - k_up + 1, 2) if k_up and k]
+    return tuple(((k_up - first_up) // 2, (k - first_low) // 2, k_up, k) for k_up, k in all_k)
 
 
 def block_elements(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:

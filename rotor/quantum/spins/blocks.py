@@ -26,7 +26,6 @@ from rotor.quantum.levels import SolvedBlock, Used
 from rotor.quantum.spins.contraction import (
     Contracted,
     Stack,
-    acting_numbers,
     operators_of_stacks,
     stacks_of,
     within_blocks,
@@ -70,7 +69,7 @@ class Shared:
     @property
     def axial(self) -> bool:
         """Whether the functions are |N K⟩ instead of Wang functions."""
-        return self.stacks[0].axial
+        return self.stacks[0].k is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,15 +163,6 @@ def diagonalised(numbers: Sequence[int], matrices: Floats, zeros_mhz: Floats) ->
     return States(numbers, energies + zeros_mhz[:, None], vectors)
 
 
-class Placed(NamedTuple):
-    """Members of families: N and class as one number (`_key`), family, place in it, and number of the rotational block."""
-
-    keys: Ints
-    families: Ints
-    places: Ints
-    numbers: Ints
-
-
 @dataclass(frozen=True)
 class Plan:
     """Solved rotation, operators of each channel, and the blocks that they connect.
@@ -201,16 +191,6 @@ class Plan:
     def sizes(self) -> list[int]:
         """The number of states of each rotational block."""
         return [len(block.energies_mhz) for block in self.blocks]
-
-    @cached_property
-    def placed(self) -> Placed:
-        """All members of families, in order of N and class."""
-        counts: Ints = np.array([len(family) for family in self.families], dtype=np.int64)
-        members = np.array([member for family in self.families for member in family]).reshape(-1, 2)
-        families, places = numbers_in_runs(counts)
-        keys = _key(np.array([block.j for block in self.blocks])[members[:, 0]], members[:, 1])
-        order = np.argsort(keys, kind="stable")
-        return Placed(keys[order], families[order], places[order], members[order, 0])
 
     def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:
         """This rotation with the operators of a treatment of the spins (all by default), which `used` describes."""
@@ -269,10 +249,12 @@ def _links(contracted: InStacks) -> Ints:
     A link is two blocks that an operator connects, and 1 if the operator changes sign with the exchange, else 0.
     """
     links = [np.zeros((0, 3), dtype=np.int64)]
-    for matrices, channels in contracted:
-        pairs = acting_numbers(matrices)
-        for changed in {int(channel.exchange < 0) for channel in channels}:
-            links.append(np.column_stack([pairs, np.full(len(pairs), changed)]))
+    for operators, channels in contracted:
+        changes = {int(channel.exchange < 0) for channel in channels}
+        for up, low, pairs, matrices in operators:
+            acting = matrices.any(axis=(1, 2))
+            first, second = up.numbers[pairs.up][acting], low.numbers[pairs.low][acting]
+            links += [np.column_stack([first, second, np.full(len(first), changed)]) for changed in changes]
     return np.concatenate(links)
 
 
@@ -304,13 +286,14 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
 
 def blocks_of_f(plan: Plan, patterns: Mapping[int, Ints]) -> tuple[Ints, PartColumns]:
     """Doubled F and parts of each block, by F, then by family; an F whose patterns no rotational block has is left out."""
-    runs, placed = _runs_of_patterns(plan, patterns), plan.placed
-    low, high = (np.searchsorted(placed.keys, runs.keys, side) for side in ("left", "right"))
+    f_of_runs, keys_of_runs, first_rows, last_rows = _runs_of_patterns(plan, patterns)
+    keys, families, places, blocks = _members_by_n(plan)
+    low, high = (np.searchsorted(keys, keys_of_runs, side) for side in ("left", "right"))
     run, member = numbers_in_runs(high - low, low)
-    family, place = placed.families[member], placed.places[member]
-    order = np.lexsort((runs.first[run], place, family, runs.f[run]))
-    run, family, numbers = run[order], family[order], placed.numbers[member[order]]
-    first, last, f = runs.first[run], runs.last[run], runs.f[run]
+    order = np.lexsort((first_rows[run], places[member], families[member], f_of_runs[run]))
+    run, member = run[order], member[order]
+    family, numbers = families[member], blocks[member]
+    first, last, f = first_rows[run], last_rows[run], f_of_runs[run]
     starts_block = np.ones(len(run), dtype=bool)
     starts_block[1:] = (f[1:] != f[:-1]) | (family[1:] != family[:-1])
     begins = np.flatnonzero(starts_block)
@@ -321,25 +304,26 @@ def blocks_of_f(plan: Plan, patterns: Mapping[int, Ints]) -> tuple[Ints, PartCol
     return f[begins], PartColumns(plan.blocks, counts, numbers, first, last, stops)
 
 
-class _Runs(NamedTuple):
-    """Successive patterns of one F with one N and class: F, key (see `Placed`), first and last row among the patterns of the F."""
+def _members_by_n(plan: Plan) -> tuple[Ints, Ints, Ints, Ints]:
+    """Members of families in order of N and class: this as a key (`_key`), family, place in it, and number of the rotational block."""
+    families, places = numbers_in_runs(np.array([len(family) for family in plan.families], dtype=np.int64))
+    members = np.array([member for family in plan.families for member in family]).reshape(-1, 2)
+    keys = _key(np.array([block.j for block in plan.blocks])[members[:, 0]], members[:, 1])
+    order = np.argsort(keys, kind="stable")
+    return keys[order], families[order], places[order], members[order, 0]
 
-    f: Ints
-    keys: Ints
-    first: Ints
-    last: Ints
 
-
-def _runs_of_patterns(plan: Plan, patterns: Mapping[int, Ints]) -> _Runs:
+def _runs_of_patterns(plan: Plan, patterns: Mapping[int, Ints]) -> Sequence[Ints]:
+    """F, key, first and last row among the patterns of the F, of successive patterns of one N and class."""
     counts = np.array([len(patterns_of_f) for patterns_of_f in patterns.values()], dtype=np.int64)
     if not counts.any():
-        return _Runs(*np.zeros((4, 0), dtype=np.int64))
+        return list(np.zeros((4, 0), dtype=np.int64))
     place, row = numbers_in_runs(counts)
     f, rows = np.array(list(patterns))[place], np.concatenate([each for each in patterns.values() if len(each)])
     keys = _key(rows[:, 0] // 2, plan.scheme.classes(rows))
     begins = np.flatnonzero(np.append(True, (f[1:] != f[:-1]) | (keys[1:] != keys[:-1])))
     lengths = np.diff(np.append(begins, len(rows)))
-    return _Runs(f[begins], keys[begins], row[begins], row[begins] + lengths)
+    return f[begins], keys[begins], row[begins], row[begins] + lengths
 
 
 def _key(n: Ints, symmetry_class: Ints) -> Ints:

@@ -47,11 +47,6 @@ class Stack(NamedTuple):
     single: list[bool]
 
     @property
-    def axial(self) -> bool:
-        """Whether the functions are |N K⟩ instead of Wang functions."""
-        return self.k is not None
-
-    @property
     def is_species(self) -> bool:
         """Whether the blocks are states of a species of internal rotation."""
         return self.blocks[0].moments is not None
@@ -175,7 +170,7 @@ def pieces_in_both_orders(
     contain them. Within a state an operator may be anti-Hermitian, as [N², φ]: each order has its own elements. A block with itself occurs
     in both orders; the last entry counts.
     """
-    axial, out = stacks[0].axial, list[Contracted]()
+    axial, out = stacks[0].k is not None, list[Contracted]()
     hermitian = all(piece.bra != piece.ket or isinstance(piece.rotor, Fixed) for piece in pieces)
     for up, low, pairs in _near(stacks, min(pieces[0].rotor.rank, _REACH), _RISES_OF_K if axial else range(1)):
         orders = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
@@ -256,15 +251,6 @@ def _species_tensor(tensors: Tensors, moments: SpeciesMoments) -> BetweenStates:
         return np.asarray(np.sqrt(up.components) * moments.reduced(up, low, tensors)) if acts else None
 
     return between
-
-
-def acting_numbers(contracted: Sequence[Contracted]) -> Ints:
-    """The pairs (pairs, 2) of block numbers between which an element is not zero."""
-    out = [np.zeros((0, 2), dtype=np.int64)]
-    for up, low, pairs, matrices in contracted:
-        acting = matrices.any(axis=(1, 2))
-        out.append(np.column_stack([up.numbers[pairs.up][acting], low.numbers[pairs.low][acting]]))
-    return np.concatenate(out)
 
 
 def within_blocks(stack: Stack, matrices: Sequence[Floats]) -> Contracted:

@@ -361,11 +361,9 @@ def _expectations(
     group: Group, at: Ints, vectors: NDArray[Any], tables: Tables, coefficients: Coefficients, frame: Frame
 ) -> Floats:
     """⟨i|Σ c X|i⟩ (blocks, n) of vectors (blocks, columns, states, n); columns of different N or kind have elements in one order."""
-    (count, _, height, n), total = vectors.shape, np.zeros((len(vectors), vectors.shape[3]))
-    for left, right, elements, coupling in between(group, group, at, 0, tables, coefficients, frame, (height, height)):
-        _, rows, columns = elements.shape
-        moved = np.matmul(elements[:, None], vectors[:, right.columns, :columns]).reshape(count, -1, rows * n)
-        moved = np.matmul(coupling, moved).reshape(count, -1, rows, n)
-        each = np.einsum("bpsn,bpsn->bn", vectors[:, left.columns, :rows].conj(), moved).real
-        total += each if left is right else 2 * each
+    height, total = vectors.shape[2], np.zeros((len(vectors), vectors.shape[3]))
+    for each in between(group, group, at, 0, tables, coefficients, frame, (height, height)):
+        bra = vectors[:, each.left.columns, : each.elements.shape[1]].conj()
+        expectations = np.einsum("bpsn,bpsn->bn", bra, each.times(vectors)).real
+        total += expectations if each.left is each.right else 2 * expectations
     return total

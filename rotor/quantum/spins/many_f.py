@@ -290,6 +290,12 @@ class Between(NamedTuple):
     elements: NDArray[Any]
     coefficients: Floats
 
+    def times(self, vectors: NDArray[Any]) -> NDArray[Any]:
+        """Σ c X V (blocks, columns', states', n) of vectors (blocks, columns, states, n)."""
+        (count, rows, states), n = self.elements.shape, vectors.shape[3]
+        moved = np.matmul(self.elements[:, None], vectors[:, self.right.columns, :states])
+        return np.matmul(self.coefficients, moved.reshape(count, -1, rows * n)).reshape(count, -1, rows, n)
+
 
 def between(
     up: Group, low: Group, chosen: Ints, step: int, tables: Tables, coefficients: Coefficients, frame: Frame,

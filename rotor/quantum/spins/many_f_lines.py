@@ -345,11 +345,8 @@ def _by_columns(
     kind = np.result_type(ket, *{each.elements.dtype for each in acting})
     moved = space.array("moved", count, columns, height, n_low, dtype=kind)
     moved.fill(0.0)
-    for left, right, elements, coefficients in acting:
-        rotation = elements[run, :height, :most]
-        _, rows, states = rotation.shape
-        of_right = np.matmul(rotation[:, None], ket[:, right.columns, :states])
-        added = np.matmul(coefficients[run], of_right.reshape(count, -1, rows * n_low))
-        moved[:, left.columns, :rows] += added.reshape(count, -1, rows, n_low)
+    for each in acting:
+        of_run = each._replace(elements=each.elements[run, :height, :most], coefficients=each.coefficients[run])
+        moved[:, each.left.columns, : of_run.elements.shape[1]] += of_run.times(ket)
     in_blocks = bra.any(axis=(0, 3))
     return np.asarray(np.matmul(bra[:, in_blocks].conj().transpose(0, 2, 1), moved[:, in_blocks]))

@@ -25,7 +25,7 @@ from rotor.quantum.spins.scheme import (
     tensor_of,
 )
 from rotor.quantum.symmetric_top_elements import coupling_to, wang_coupling
-from rotor.quantum.tensors import BodyTensor, overlap
+from rotor.quantum.tensors import BodyTensor, folded_places, overlap
 from rotor.quantum.wang.basis import SPECIES, Part, SpeciesFactors, WangBlock
 from rotor.quantum.wang.wang_matrix import diagonal_elements, unit_diagonals
 
@@ -213,8 +213,10 @@ def _tensor_elements(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: P
             rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
             first, count = low.first_k + 2 * source.start, source.stop - source.start
             elements[:, rows, columns] = _couplings(all_n, rise, rank, step, first, count) * parts[:, rank + step, None]
-    if rank > 1:
-        _add_folded(elements, parts, up, low, (all_n, rise))
+    for row, column, k_up, k in folded_places(up.first_k, low.first_k, rank):
+        if row < up.size and column < low.size:
+            turned = _couplings(all_n, rise, rank, k_up + k, -k, 1)[:, 0]
+            elements[:, row, column] += low.sign * turned * parts[:, rank + k_up + k]
     if closes.all():
         return elements
     out = np.zeros((len(closes), up.size, low.size))
@@ -235,18 +237,6 @@ def _couplings(all_n: tuple[int, ...], rise: int, rank: int, step: int, first_k:
     out = wang_coupling(np.array(all_n)[:, None], rise, rank, step, first_k + 2.0 * np.arange(count))
     out.flags.writeable = False
     return out
-
-
-def _add_folded(
-    elements: Floats, parts: Floats, up: WangBlock, low: WangBlock, n_and_rise: tuple[tuple[int, ...], int]
-) -> None:
-    """Add the elements that connect K with -K', as in `tensors.bands_between`: s X(K', -K) for 1 ≤ K, K' and K + K' ≤ rank."""
-    rank, (all_n, rise) = parts.shape[1] // 2, n_and_rise
-    for column, k in enumerate(low.k[:rank].tolist()):
-        for row, k_up in enumerate(up.k[:rank].tolist()):
-            if k and k_up and k + k_up <= rank:
-                turned = _couplings(all_n, rise, rank, k + k_up, -k, 1)[:, 0]
-                elements[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
 
 
 def _axial_powers(rotor: Scalar, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
