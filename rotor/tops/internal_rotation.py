@@ -72,6 +72,17 @@ def sigma_species(count: int) -> dict[str, tuple[int, ...]]:
     }
 
 
+def spin_functions(states: int) -> tuple[int, int]:
+    """Numbers of spin functions of A, and of one component of E, of three equal nuclei with n = 2I + 1 states each.
+
+    The rotations by ±120° leave n of the n³ products unchanged, so that A has (n³ + 2n)/3 and each component of E has (n³ - n)/3.
+
+    >>> spin_functions(2), spin_functions(3)  # CH3, CD3
+    ((4, 2), (11, 8))
+    """
+    return (states**3 + 2 * states) // 3, (states**3 - states) // 3
+
+
 def is_torsional(name: str) -> bool:
     """Whether a constant belongs to an internal rotor: F, rho, a barrier, a named term, or a term spelled with p, cos or sin.
 
@@ -96,7 +107,9 @@ def values_and_settings(items: Sequence[str]) -> tuple[dict[str, Any], dict[str,
         if not (name and equals and value):
             raise ValueError(f"internal rotation: {item!r}: expected NAME=VALUE, such as V3=407.6cm-1, without spaces")
         values[name] = value
-    settings: dict[str, Any] = {k: int(values.pop(k)) for k in ("vt_max", "functions", "spin_states") if k in values}
+    settings: dict[str, Any] = {k: int(values.pop(k)) for k in ("vt_max", "functions") if k in values}
+    if states := values.pop("spin_states", ""):
+        settings["spin_states"] = tuple(int(number) for number in states.split(","))
     if names := values.pop("names", ""):
         settings["names"] = names
     if exchanged := values.pop("exchanged", ""):
@@ -110,22 +123,22 @@ class InternalRotationConstants:
 
     values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM" or "PAM".
     vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions retained for each K; 0 stands for 9, and for
-    25 products of two tops, 60 of three. spin_states: 2I + 1 of each nucleus of the top, 2 of hydrogen. names: "K", E levels of a nearly
-    free top are named by the signed K of largest weight; "energy", Ka and Kc are counted by energy inside each v_t, as westerfit and BELGI
-    (A levels) do, which is another order for such a top.
+    25 products of two tops, 60 of three. spin_states: 2I + 1 of each nucleus of a top, 2 of hydrogen; (2, 3) is that of each top, CH3 and
+    CD3. names: "K", E levels of a nearly free top are named by the signed K of largest weight; "energy", Ka and Kc are counted by energy
+    inside each v_t, as westerfit and BELGI (A levels) do, which is another order for such a top.
     exchanged: of two equivalent tops 2I + 1 of the nuclei of each further pair that goes over into itself when they are exchanged, (2,) of
     propane with the hydrogens of CH2. uncertainties: in MHz (of rho without a unit). source: where the values are from.
 
     >>> constants = InternalRotationConstants({"F": "7.6 cm-1", "rho": 0.33, "V3": "408 cm-1"}, "RAM")
     >>> round(constants.values["V3"]), constants.weights
-    (12231532, (4, 4))
+    (12231532, ((4, 2),))
     """
 
     values: Mapping[str, float]
     frame: str
     vt_max: int = 1
     functions: int = 0
-    spin_states: int = 2
+    spin_states: int | tuple[int, ...] = 2
     names: str = "K"
     exchanged: tuple[int, ...] = ()
     uncertainties: Mapping[str, float] = field(default_factory=dict)
@@ -155,6 +168,10 @@ class InternalRotationConstants:
         if self.exchanged and (self.tops != 2 or min(self.exchanged) < 1):
             raise ValueError(
                 f"exchanged = {list(self.exchanged)}: expected 2I + 1 of each pair of nuclei that the exchange of two tops exchanges too"
+            )
+        if len(self.states_of_tops) != self.tops or min(self.states_of_tops) < 1:
+            raise ValueError(
+                f"spin_states = {self.spin_states}: expected 2I + 1 of the nuclei of all tops, or of each of {self.tops}"
             )
         object.__setattr__(self, "values", MappingProxyType(numbers))
         object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
@@ -215,10 +232,12 @@ class InternalRotationConstants:
         return cls(values, frame, **settings)
 
     @property
-    def weights(self) -> tuple[int, int]:
-        """Spin weights of A, and of E with both components, for three equal nuclei with n = 2I + 1 states each.
+    def states_of_tops(self) -> tuple[int, ...]:
+        """2I + 1 of the nuclei of each top."""
+        states = (self.spin_states,) if isinstance(self.spin_states, int) else tuple(self.spin_states)
+        return states * self.tops if len(states) == 1 else states
 
-        A has (n³ + 2n)/3 of the n³ spin functions, each component of E (n³ - n)/3: 4 and 4 for CH3, 11 and 16 for CD3.
-        """
-        n = self.spin_states
-        return (n**3 + 2 * n) // 3, 2 * (n**3 - n) // 3
+    @property
+    def weights(self) -> tuple[tuple[int, int], ...]:
+        """Spin functions of each top (`spin_functions`)."""
+        return tuple(spin_functions(states) for states in self.states_of_tops)

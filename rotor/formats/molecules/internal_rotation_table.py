@@ -21,8 +21,8 @@ from rotor.formats.molecules.spin_table import uncertain_entry
 from rotor.tops.constants.constants import Constants
 from rotor.tops.internal_rotation import BARE, InternalRotationConstants
 
-SETTINGS = ("vt_max", "functions", "spin_states")
-KEYS = ("source", "unverified", "unit", "frame", "names", "exchanged", *SETTINGS)
+SETTINGS = ("vt_max", "functions")
+KEYS = ("source", "unverified", "unit", "frame", "names", "exchanged", "spin_states", *SETTINGS)
 
 
 def read_internal_rotation(table: TableReader | None, constants: Constants | None) -> InternalRotationConstants | None:
@@ -39,8 +39,13 @@ def read_internal_rotation(table: TableReader | None, constants: Constants | Non
                 errors[key] = error
     settings = {key: number for key in SETTINGS if (number := table.whole(key)) is not None}
     names, exchanged = table.text("names", "K"), table.content.get("exchanged", [])
-    if not isinstance(exchanged, list) or not all(type(number) is int for number in exchanged):
+    if not _are_whole(exchanged):
         raise table.error("exchanged", "expected a list of whole numbers, 2I + 1 of each exchanged pair, such as [2]")
+    states = table.content.get("spin_states", 2)
+    if not _are_whole([states] if type(states) is int else states):
+        raise table.error(
+            "spin_states", "expected 2I + 1 of the nuclei of all tops, such as 2, or of each top, such as [2, 3]"
+        )
     try:
         return InternalRotationConstants(
             values,
@@ -48,11 +53,17 @@ def read_internal_rotation(table: TableReader | None, constants: Constants | Non
             **settings,
             names=names,
             exchanged=tuple(exchanged),
+            spin_states=states if type(states) is int else tuple(states),
             uncertainties=errors,
             source=table.text("source"),
         )
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
+
+
+def _are_whole(numbers: object) -> bool:
+    """Whether these are a list of whole numbers."""
+    return isinstance(numbers, list) and all(type(number) is int for number in numbers)
 
 
 def internal_rotation_table(constants: InternalRotationConstants | None) -> Mapping[str, Any]:
@@ -63,6 +74,8 @@ def internal_rotation_table(constants: InternalRotationConstants | None) -> Mapp
         name: uncertain_entry(value, constants.uncertainties.get(name)) for name, value in constants.values.items()
     }
     settings = {key: getattr(constants, key) for key in SETTINGS}
+    states = constants.spin_states
+    settings["spin_states"] = states if isinstance(states, int) else list(states)
     return {"frame": constants.frame, "unit": "MHz", **values, **settings, "names": constants.names} | (
         {"exchanged": list(constants.exchanged)} if constants.exchanged else {}
     )

@@ -36,6 +36,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.labelled import ROUND_OFF, Elements, merged
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.functions import TorsionRotation
+from rotor.tops.internal_rotation import spin_functions
 
 TURNS = {"a": (1.0, -1.0, -1.0), "b": (-1.0, 1.0, -1.0), "c": (-1.0, -1.0, 1.0)}  # C2 about an axis on (a, b, c)
 
@@ -157,7 +158,7 @@ class SpinCounts:
         [36, 28]
         """
         n, all_pairs, trace = self.states, math.prod(m * m for m in self.pairs), math.prod(self.pairs)
-        d = [(n**3 + 2 * n) // 3, (n**3 - n) // 3]
+        d = spin_functions(n)
         first, second = (d[abs(number)] for number in sigma)
         if sigma[0] != sigma[1]:
             return np.full(len(x), first * second * all_pairs * (1 if all(sigma) else 2))

@@ -236,12 +236,8 @@ def _carbon_of_unlike_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> in
     return 0
 
 
-def _spin_states(top: Top, groups: Sequence[MethylGroup]) -> int:
-    """2I + 1 of the nuclei that turn: 3 of CD3, else 2; ValueError for groups of both kinds."""
+def _spin_states(top: Top, groups: Sequence[MethylGroup]) -> int | tuple[int, ...]:
+    """2I + 1 of the nuclei of each group: 3 of CD3, else 2; one number if all have the same."""
     assert top.molecule is not None
-    deuterated = {top.molecule.mass_numbers[group.hydrogens[0]] == 2 for group in groups}
-    if len(deuterated) > 1:
-        raise ValueError(
-            f"internal rotation of {top.name or 'this top'}: CH3 and CD3 turn; spin weights are those of groups of one isotope"
-        )
-    return 3 if deuterated == {True} else 2
+    states = tuple(3 if top.molecule.mass_numbers[group.hydrogens[0]] == 2 else 2 for group in groups)
+    return states[0] if len(set(states)) == 1 else states

@@ -298,6 +298,11 @@ class Degeneracies:
                 "internal rotation: exchanged nuclei are stated, and no twofold axis a, b or c exchanges the tops: expected equal F0, V3, "
                 "V6, and angles such as delta_2 = pi - delta_1"
             )
+        if equivalent and len(set(constants.states_of_tops)) > 1:
+            raise ValueError(
+                f"spin_states = {constants.spin_states} of tops with equal constants, which C2 exchanges: expected the same nuclei, or the "
+                "constants by which the tops differ"
+            )
         return cls(constants, equivalent)
 
     def columns(self, species: str, functions: TorsionRotation, rows: Ints) -> Columns:
@@ -319,16 +324,17 @@ class Degeneracies:
         """
         names = sigma_species(self.constants.tops)
         if self.equivalent:
-            counts = SpinCounts(self.constants.spin_states, self.constants.exchanged)
+            counts = SpinCounts(self.constants.states_of_tops[0], self.constants.exchanged)
             signs = np.array([1, -1])
             divisor = np.gcd.reduce(
                 np.concatenate([counts.functions_of_species(sigma, signs) for sigma in sigma_species(2).values()])
             )
             x = functions.labels.get("x", np.ones(len(functions.labels["J"]), dtype=np.int64))
             return np.asarray(counts.functions_of_species(names[species], x[rows]) // divisor)
-        a, e = self.constants.weights
         weights = {
-            name: (1 + any(sigma)) * math.prod(e // 2 if s else a for s in sigma) for name, sigma in names.items()
+            name: (1 + any(sigma))
+            * math.prod(top[abs(s)] for top, s in zip(self.constants.weights, sigma, strict=True))
+            for name, sigma in names.items()
         }
         return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
 

@@ -289,8 +289,8 @@ def _between(
             up_rows, low_rows = up.rows[left[run], : bra.shape[3]], low.rows[right[run], : ket.shape[3]]
             if near is not None:
                 needed = near(up_rows, low_rows)
-                bra, up_rows = _states_with_lines(bra, up_rows, needed.any(axis=2))
-                ket, low_rows = _states_with_lines(ket, low_rows, needed.any(axis=1))
+                bra, up_rows = _states_with_lines(bra, up_rows, np.asarray(needed.any(axis=2)))
+                ket, low_rows = _states_with_lines(ket, low_rows, np.asarray(needed.any(axis=1)))
             each = [operator(run, bra, ket) for operator in operators] if up_rows.size and low_rows.size else []
             if not each:
                 continue

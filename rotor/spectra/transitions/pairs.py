@@ -265,7 +265,7 @@ def _many_f_transitions(
 
     def in_range(up: Indices, low: Indices) -> NDArray[np.bool_]:
         frequency = np.abs(energies[up][:, :, None] - energies[low][:, None, :])
-        return (frequency >= first) & (frequency <= last)
+        return np.asarray((frequency >= first) & (frequency <= last))
 
     near = None if range_mhz == EVERYTHING else in_range
     groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].spins.shared, tensors), len(levels), near=near)

@@ -3,15 +3,38 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 import rotor
 from rotor import units
+from rotor.formats.molecules.molecule_file import read_molecule_file
+from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.quantum.estimates.budgets import known_covariance, level_errors
 from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
+from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
+
+TWO_TOPS = """
+name = "two tops"
+[constants]
+A = 9000
+B = 7000
+C = 4500
+reduction = "A"
+representation = "Ir"
+[internal_rotation]
+frame = "PAM"
+F0_1 = 160e3
+delta_1 = 0.5
+V3_1 = 8e6
+F0_2 = 80e3
+delta_2 = 2.6
+V3_2 = 8e6
+spin_states = [2, 3]
+"""
 
 
 def _species_weights(top):
@@ -60,6 +83,65 @@ def test_propane_exchanges_the_hydrogens_of_ch2_too():
     assert _species_weights(top)["AA"] == 9  # of 36 : 28
 
 
+def _functions_by_species(states):
+    """Spin functions by the σ of each top, of tops with three nuclei of 2I + 1 states: counted from traces of the permutations.
+
+    The number for (σ1, σ2, ...) is the mean over all combinations of rotations by 0, 120 and 240° of Π exp(-i 2π σ n/3) times the number
+    of product functions that the permutation leaves unchanged.
+    """
+    counts = {}
+    for sigma in product((0, 1, -1), repeat=len(states)):
+        total = 0.0
+        for turns in product(range(3), repeat=len(states)):
+            fixed = [
+                sum(np.roll(f, n).tolist() == list(f) for f in product(range(m), repeat=3))
+                for m, n in zip(states, turns, strict=True)
+            ]
+            total += np.prod(fixed) * np.exp(-2j * np.pi / 3 * np.dot(sigma, turns))
+        counts[sigma] = round((total / 3 ** len(states)).real)
+    return counts
+
+
+def test_ch3_beside_cd3_has_the_weights_of_all_spin_functions():
+    molecule = rotor.read("SMILES:CC(=O)C").molecule.with_isotopes("5=2H,6=2H,7=2H")
+    top = with_internal_rotation(rotor.Top.from_molecule(molecule), given="V3=266cm-1 vt_max=0")
+    f0 = [top.internal_rotation.values[f"F0_{number}"] for number in (1, 2)]
+    assert f0[0] / f0[1] == pytest.approx(0.5 if f0[0] < f0[1] else 2.0, rel=0.01)
+    states = top.internal_rotation.spin_states
+    assert states == ((3, 2) if f0[0] < f0[1] else (2, 3))
+    counts = _functions_by_species(states)
+    assert sum(counts.values()) == 6**3
+    expected = {
+        name: (1 if name == "AA" else 2) * counts[sigma] for name, sigma in sigma_species(2).items()
+    }  # σ and -σ coincide
+    levels = rotor.api.solve_levels(top, 2)
+    divisor = int(np.gcd.reduce(list(expected.values())))
+    for name, number in expected.items():
+        here = levels.quanta["species"] == name
+        assert here.any()
+        assert (levels.weight[here] * divisor == number).all()
+
+
+def test_nuclei_of_each_top_are_settings(tmp_path):
+    text = "PAM F0_1=160GHz delta_1=0.5 V3_1=266cm-1 F0_2=80GHz delta_2=2.6 V3_2=266cm-1 spin_states=2,3 vt_max=0"
+    internal = InternalRotationConstants.parse(text)
+    assert internal.weights == ((4, 2), (11, 8))
+    constants = rotor.Constants(A=9000.0, B=7000.0, C=4500.0, reduction="A", representation="Ir")
+    (tmp_path / "top.toml").write_text(TWO_TOPS)
+    molecule = read_molecule_file(tmp_path / "top.toml")
+    assert molecule.internal_rotation.spin_states == (2, 3)
+    assert "spin_states = [2, 3]" in molecule_file_text(molecule)
+    (tmp_path / "top.toml").write_text(TWO_TOPS.replace("[2, 3]", '"2"'))
+    with pytest.raises(ValueError, match=r"spin_states.*of each top, such as .2, 3."):
+        read_molecule_file(tmp_path / "top.toml")
+    with pytest.raises(ValueError, match=r"spin_states = .2, 3, 3.: expected 2I . 1 .* of each of 2"):
+        InternalRotationConstants.parse(text.replace("2,3", "2,3,3"))
+    equal = text.replace("F0_2=80GHz delta_2=2.6", f"F0_2=160GHz delta_2={np.pi - 0.5}")
+    top = rotor.Top.from_constants(constants, internal_rotation=InternalRotationConstants.parse(equal))
+    with pytest.raises(ValueError, match="tops with equal constants, which C2 exchanges: expected the same nuclei"):
+        rotor.api.solve_levels(top, 1)
+
+
 def test_groups_of_different_kinds_have_barriers_of_their_own():
     top = with_internal_rotation(rotor.read("SMILES:CC(=O)OC"), given="vt_max=0")
     values, errors = top.internal_rotation.values, top.internal_rotation.uncertainties
@@ -80,18 +162,15 @@ def test_a_given_value_replaces_that_of_the_geometry_and_is_exact():
 
 
 @pytest.mark.parametrize(
-    ("smiles", "isotopes", "reason"),
+    ("smiles", "reason"),
     [
-        ("CC(C)(C)C", "", "4 methyl groups turn; up to three"),
-        ("CC(=O)C", "5=2H,6=2H,7=2H", "CH3 and CD3 turn"),
-        ("C=C", "", "no methyl group turns"),
-        ("Cc1ccccc1", "", r"no threefold barrier .toluene: V6 = 4.88 cm-1 alone.; give both"),
+        ("CC(C)(C)C", "4 methyl groups turn; up to three"),
+        ("C=C", "no methyl group turns"),
+        ("Cc1ccccc1", r"no threefold barrier .toluene: V6 = 4.88 cm-1 alone.; give both"),
     ],
 )
-def test_groups_that_cannot_be_computed_are_named(smiles, isotopes, reason):
+def test_groups_that_cannot_be_computed_are_named(smiles, reason):
     top = rotor.read(f"SMILES:{smiles}")
-    if isotopes:
-        top = rotor.Top.from_molecule(top.molecule.with_isotopes(isotopes))
     with pytest.raises(ValueError, match=reason):
         with_internal_rotation(top)
 
