@@ -58,6 +58,15 @@ def leave_or_remove(text: Any, axes: Any, boxes: list[Any], drawn: Floats) -> No
         text.remove()
 
 
+def height_share(axes: Any, name: str) -> float:
+    """Part of the height of the axes that an upright name takes with the space below and above it."""
+    axes.figure.canvas.draw()  # computes the layout, so that pixel sizes are valid
+    text = _written(axes, Peak(axes.get_xlim()[0], axes.get_ylim()[0], name, "black"))
+    share = (text.get_window_extent().height + 4.0 * axes.figure.dpi / 72.0) / axes.bbox.height
+    text.remove()
+    return float(share)
+
+
 def _written(axes: Any, peak: Peak) -> Any:
     text = axes.annotate(
         peak.name, (peak.x, peak.y), xytext=(0, 3), textcoords="offset points", rotation=90, ha="center", va="bottom",

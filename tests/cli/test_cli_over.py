@@ -111,6 +111,9 @@ def test_series_of_split_lines_have_species_and_sums_of_spins() -> None:
     assert re.fullmatch(r"\$\\mathrm{A}\\;v_t{=}0\\;\d_{\d,\d}\$ – \$\d_{\d,\d}\$, \$F = \d+/2 – \d+/2\$", names[0]), (
         names[0]
     )
+    figure = over_figure(lines, lines.intensity_nm2_mhz, spectrum(), "")
+    figure.canvas.draw()
+    assert all(text.get_window_extent().y1 <= figure.axes[0].bbox.y1 for text in figure.axes[0].texts)
     species = [name[9] for name in names]
     assert species == sorted(species)
     assert {*species} == {"A", "E"}

@@ -187,6 +187,42 @@ def test_every_free_level_of_a_stark_map_is_named(molecule):
     assert sorted(named) == sorted(expected)
 
 
+@pytest.fixture(scope="module")
+def turning():
+    """A top with a methyl group and 14N."""
+    from rotor.tops.internal_rotation import InternalRotationConstants
+
+    constants = {"A": 9200.0, "B": 3000.0, "C": 2310.0, "chi_aa(14N)": 1.9, "chi_bb-cc(14N)": -0.1}
+    rotors = InternalRotationConstants({"F0": 160000.0, "delta": 0.6, "V3": 9e6}, frame="PAM")
+    return rotor.Top.from_constants(constants, dipole_abc_debye=(1.5, 1.0, 0.0), internal_rotation=rotors)
+
+
+def test_a_stark_map_of_a_methyl_group_has_short_names_and_all_m(turning):
+    """Eight levels share a name within the picture; M of E has both signs and is not mixed."""
+    figure = rotor.plot(rotor.stark(turning, fields_kv_per_cm="0:4kV/cm:3", j_highest=1))
+    figure.canvas.draw()  # a warning where the layout fails is an error
+    axes = figure.axes[0]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["|M| = 0", "|M| = 1"]
+    names = [text.get_text() for text in axes.texts]
+    assert any(name.endswith(" (8)") and " … " in name for name in names)
+    assert axes.bbox.width > 0.8 * figure.bbox.width
+    assert all(text.get_window_extent().x0 > 0 for text in axes.texts)
+
+
+def test_names_of_torsional_levels_end_before_the_next_column(turning):
+    figure = rotor.plot(rotor.levels(turning, jmax=3))
+    figure.canvas.draw()
+    axes = figure.axes[0]
+    names = [text for text in axes.texts if text.get_position()[0] < 3]
+    pitch = axes.transData.transform((1, 0))[0] - axes.transData.transform((0, 0))[0]
+    assert len(names) >= 4
+    assert any("A,E" in text.get_text() for text in names)
+    for text in names:
+        column = math.floor(text.get_position()[0])
+        next_step = axes.transData.transform((column + 1, 0))[0] - 0.12 * pitch
+        assert text.get_window_extent().x1 < next_step + 1
+
+
 def test_lines_in_a_field_that_lie_far_apart_have_a_panel_each():
     fields = np.linspace(0.0, 1.0, 5)
     figure = rotor.plot(rotor.api.field_lines(rotor.read("OCS"), fields))

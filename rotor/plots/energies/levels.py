@@ -35,10 +35,11 @@ from rotor.tops.top import Top
 UNITS = {"MHz": "energy_mhz", "cm-1": "energy_cm", "K": "energy_k"}
 SIZE_INCHES = (WIDTH_INCHES, 5.4)
 HALF_WIDTH = 0.26  # of a step, in columns: a label fits before the next column
-NARROW = 0.18  # the same if labels also have the number of the vibrational state
+NARROW, NARROWEST = 0.18, 0.12  # the same if labels also have the vibrational state, or species and torsional state
 MOST_LABELS = 160
 MOST_OF_WIDTH = 0.5  # wider names do not move the end of the axis
 MOST_WEIGHTS = 4
+_STATES = {"v", "vt", "species"}  # quantum numbers beside those of the rotation
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def levels_figure(
     energy = np.asarray(getattr(table, UNITS[unit]))
     with styled():
         figure, axes = panel(axes, SIZE_INCHES)
-        half_width = NARROW if "v" in table.levels.quanta else HALF_WIDTH
+        half_width = _half_width(table.levels)
         _draw(axes, column, energy, _species(table, top), half_width)
         show_part(axes, View(vertical=view.vertical))
         axes.set_xlabel({"Ka": "$K_a$", "Kc": "$K_c$"}.get(name, f"${name}$"))
@@ -103,6 +104,13 @@ def levels_figure(
             legend_below(figure, axes, ncols=3, fontsize=9)
         _label(figure, axes, table, column, energy, half_width)
     return figure
+
+
+def _half_width(levels: Levels) -> float:
+    """Half the width of a step, in columns; steps are shorter where labels are longer."""
+    if "species" in levels.quanta:
+        return NARROWEST
+    return NARROW if "v" in levels.quanta else HALF_WIDTH
 
 
 def _in_view(table: SelectedLevels, column: Ints, energy: Floats, view: View) -> tuple[SelectedLevels, Ints]:
@@ -230,5 +238,5 @@ def _widen(axes: Any, names: Sequence[Any]) -> None:
 def _rotational_levels(table: SelectedLevels) -> Ints:
     """Number of the rotational level for each row, shared by all its vibrational states and spin components."""
     quanta = rotational_quanta(table.levels.quanta)
-    numbers = np.stack([column[table.rows] for name, column in quanta.items() if name != "v"], axis=1)
+    numbers = np.stack([column[table.rows] for name, column in quanta.items() if name not in _STATES], axis=1)
     return np.asarray(np.unique(numbers, axis=0, return_inverse=True)[1]).ravel()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -21,6 +22,7 @@ NARROW_INCHES = 5.0
 SIZE_INCHES = (WIDTH_INCHES, 6.0)
 LEAST_DRAWN = 1e-4  # relative to the strongest line
 MOST_LABELS = 27  # on the axis of energies; a name takes 1/27 of its height
+MOST_CHARACTERS = 40  # of names that share a place
 WIDEST = 0.5  # part of the width that names may take
 GAP_OF_PANELS = 10.0  # of lines in a field: gap to the next panel, relative to the widest shift
 MOST_PANELS = 4
@@ -78,10 +80,11 @@ def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
     seen: set[float] = set()
     ends: list[tuple[float, str]] = []
     levels = field_map.request.space(field_map.jmax).levels
+    projections = _projections(field_map)
     first = [name for name in BEFORE_J if name in levels.quanta]
     names = [*first, "j", *(name for name in levels.quanta if name not in first)]  # in the order of labels
     for rows in _curves(field_map, view):
-        m = float(field_map.m[rows[0]])
+        m = float(projections[rows[0]])
         energies = field_map.energy_mhz[rows] / MHZ_PER_CM
         label = None if m in seen else ("M mixed" if m < 0 else f"|M| = {m:g}")
         axes.plot(field_map.field[rows], energies, color=_colour(m), linewidth=0.9, label=label)
@@ -98,6 +101,12 @@ def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
             axes.figure.legend(fontsize=9, loc="outside upper right", ncols=len(seen))
         else:
             axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
+
+
+def _projections(field_map: FieldMap) -> Floats:
+    """|M| of each row, -1 where M is mixed. Levels of species E with M and -M are apart and share a colour."""
+    good = field_map.request.space(field_map.jmax).m_is_good
+    return np.abs(field_map.m) if good else np.full(len(field_map.m), -1.0)
 
 
 def _curves(field_map: FieldMap, view: View) -> list[Ints]:
@@ -148,7 +157,15 @@ def _grouped(levels: list[tuple[float, str]], height: float) -> list[tuple[float
         near = int(np.argmin(_gaps(groups)))
         energies, labels = groups.pop(near + 1)
         groups[near] = (groups[near][0] + energies, groups[near][1] + labels)
-    return [(float(np.mean(energies)), ", ".join(dict.fromkeys(labels))) for energies, labels in groups]
+    return [(float(np.mean(energies)), _joined([*dict.fromkeys(labels)])) for energies, labels in groups]
+
+
+def _joined(labels: list[str]) -> str:
+    """Names in one line; of a long list the first, the last and their number."""
+    text = ", ".join(labels)
+    if len(labels) < 3 or len(re.sub(r"\\[a-z]+|\\;|[${}_\\]", "", text)) <= MOST_CHARACTERS:
+        return text
+    return f"{labels[0]} … {labels[-1]} ({len(labels)})"
 
 
 def _gaps(groups: list[tuple[list[float], list[str]]]) -> Floats:
@@ -166,9 +183,10 @@ def _apart(energies: Floats, height: float, low: float, high: float) -> Floats:
 
 
 def _slopes(axes: Any, field_map: FieldMap, unit: str, view: View) -> None:
+    projections = _projections(field_map)
     for rows in _curves(field_map, view):
         x, y = _with_curve(field_map, rows)
-        axes.plot(x, y, color=_colour(float(field_map.m[rows[0]])), linewidth=0.8)
+        axes.plot(x, y, color=_colour(float(projections[rows[0]])), linewidth=0.8)
     axes.axhline(0.0, color=GREY, linewidth=0.6, linestyle=":")
     axes.set_xlabel(f"Field ({unit})")
     name = r"Dipole $\mu_{\mathrm{eff}}$ (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment.peaks.peak_list import PeakList
-from rotor.plots.names import Peak, name_peaks
+from rotor.plots.names import Peak, height_share, name_peaks
 from rotor.plots.picture import (
     BLUE,
     GREY,
@@ -31,7 +31,8 @@ from rotor.spectra.lines import Lines
 MOST_ROWS = 60
 WINDOW_MHZ = 5.0  # on either side of a line
 MOST_NAMES = 24
-NAME_SHARE = 0.32  # part of the vertical axis that a name above the tallest peak may take
+NAME_SHARE = 0.32  # part of the vertical axis above the tallest peak, more for a long name
+MOST_OF_HEIGHT = 0.6  # part of the vertical axis that a name may take
 LEAST_NAMED = 1e-2  # relative to the strongest line in view
 BESIDE = 500  # a peak belongs to a line nearer than the width of the picture divided by this
 BESIDE_PEAKS = 0.02  # of the band, left and right of the outermost peaks
@@ -66,11 +67,15 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
         margin = 0.0 if peaks.trace else BESIDE_PEAKS * (last - first)  # the band of a list ends at its outermost peaks
         axes.set_xlim(first - margin, last + margin)
         low, tallest = -1.05 * float(heights.max(initial=0.0)), float(peaks.intensity.max())
-        axes.set_ylim(low, (tallest - NAME_SHARE * low) / (1 - NAME_SHARE))
         show_part(axes, view)
+        named = _named_lines(axes, lines, heights, peaks)
+        if view.vertical is None:
+            names = [peak.name for peak in sorted(named, key=lambda peak: -peak.y)[:1]]
+            share = min(max([NAME_SHARE, *(height_share(axes, name) for name in names)]), MOST_OF_HEIGHT)
+            axes.set_ylim(low, (tallest - share * low) / (1 - share))
         curves = [(peaks.frequency_mhz, peaks.intensity), *(thinned(*piece) for piece in peaks.trace)]
         drawn = np.concatenate([np.stack(curve, axis=1) for curve in curves])
-        name_peaks(axes, _named_lines(axes, lines, heights, peaks), drawn, MOST_NAMES)
+        name_peaks(axes, named, drawn, MOST_NAMES)
         return figure
 
 
