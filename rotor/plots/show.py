@@ -49,7 +49,7 @@ def plot(
     Parameters
     ----------
     thing : Lines, Spectrum, RamanLines, Levels, FreeMotion, ThermoFunctions, Correlations, Equipartition, Catalogue, Fit
-        What to draw: one of these, or the answer to a request for one of them.
+        What to draw: one of these, the answer to a request for one of them, or the result of a verb.
     path : path, optional
         A .png, .pdf or .svg file to write.
     ax : matplotlib.axes.Axes, optional
@@ -78,6 +78,7 @@ def plot(
     >>> figure.axes[0].get_xlabel()
     'Frequency (GHz)'
     """
+    thing = getattr(thing, "answer", thing)  # of the result of a verb
     module = _picture_module(thing)
     if path is not None:
         checked_suffix(path)

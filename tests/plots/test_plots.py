@@ -209,6 +209,12 @@ def test_a_stark_map_of_a_methyl_group_has_short_names_and_all_m(turning):
     assert all(text.get_window_extent().x0 > 0 for text in axes.texts)
 
 
+def test_the_result_of_a_verb_is_drawn_as_by_its_method():
+    result = rotor.levels("CO", jmax=3)
+    by_function, by_method = rotor.plot(result), result.plot()
+    assert by_function.axes[0].get_title(loc="left") == by_method.axes[0].get_title(loc="left") != ""
+
+
 def test_names_of_torsional_levels_end_before_the_next_column(turning):
     figure = rotor.plot(rotor.levels(turning, jmax=3))
     figure.canvas.draw()
@@ -219,7 +225,7 @@ def test_names_of_torsional_levels_end_before_the_next_column(turning):
     assert any("A,E" in text.get_text() for text in names)
     for text in names:
         column = math.floor(text.get_position()[0])
-        next_step = axes.transData.transform((column + 1, 0))[0] - 0.12 * pitch
+        next_step = axes.transData.transform((column + 1, 0))[0] - 0.1 * pitch
         assert text.get_window_extent().x1 < next_step + 1
 
 

@@ -35,7 +35,7 @@ from rotor.tops.top import Top
 UNITS = {"MHz": "energy_mhz", "cm-1": "energy_cm", "K": "energy_k"}
 SIZE_INCHES = (WIDTH_INCHES, 5.4)
 HALF_WIDTH = 0.26  # of a step, in columns: a label fits before the next column
-NARROW, NARROWEST = 0.18, 0.12  # the same if labels also have the vibrational state, or species and torsional state
+NARROW, NARROWEST = 0.18, 0.1  # the same if labels also have the vibrational state, or species and torsional state
 MOST_LABELS = 160
 MOST_OF_WIDTH = 0.5  # wider names do not move the end of the axis
 MOST_WEIGHTS = 4
