@@ -155,12 +155,21 @@ def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Re
     declared = {field.name: field for field in verb.fields.values()}
     unknown = [name for name in values if name not in declared]
     if unknown:
-        others = f"; it takes {', '.join(declared)}"
-        raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], declared) or others}")
+        raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{_meant(unknown[0], declared)}")
     entries = Entries({declared[name].identity: value for name, value in values.items() if value is not None}, "name")
     work = Work(shown=verb.read_shown(entries), note=_Notes(), provenance={"command": f"rotor.{verb.name}"})
     outcome = Calculation(verb, entries, work).run(executor)
     return Result(**{field.name: getattr(outcome, field.name) for field in fields(Outcome)})
+
+
+def _meant(unknown: str, declared: Mapping[str, Field]) -> str:
+    """End of a message on an unknown argument: that of the option or scene key with this name, else similar names."""
+    option, key = f"--{unknown.replace('_', '-')}", f".{unknown}"
+    same = [name for name, field in declared.items() if field.called("option") == option]
+    same = same or [name for name, field in declared.items() if field.called("key").endswith(key)]
+    if same:
+        return f"; did you mean {same[0]}?"
+    return did_you_mean(unknown, declared) or f"; it takes {', '.join(declared)}"
 
 
 @cache

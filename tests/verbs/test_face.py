@@ -72,6 +72,18 @@ def test_a_text_with_a_unit_is_a_number():
     assert (table.fields == field).all()
 
 
+@pytest.mark.parametrize(
+    ("verb", "typed", "meant"),
+    [
+        ("stark", "field", "fields_kv_per_cm"), ("stark", "states", "j_highest"), ("align", "pulse", "pulses"),
+        ("tumble", "omega", "angular_velocity"), ("spectrum", "fwhm", "fwhm_mhz"),
+    ],
+)  # fmt: skip
+def test_names_of_options_lead_to_arguments(verb, typed, meant):
+    with pytest.raises(TypeError, match=rf"no argument '{typed}'; did you mean {meant}\w*\?"):
+        getattr(rotor, verb)("water", **{typed: 1})
+
+
 def test_wrong_arguments_are_named():
     with pytest.raises(TypeError, match=r"spectrum\(\): no argument 'temprature_k'; did you mean temperature_k"):
         rotor.spectrum("CO", temprature_k=3)
