@@ -27,7 +27,8 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.checks import Renamed
 from rotor.quantum.fields.inputs import INTENSITY
-from rotor.requests.field import REQUIRED, check_fields, declared
+from rotor.requests.choices import Choices
+from rotor.requests.field import REQUIRED, all_fields, check_fields, declared
 from rotor.requests.fill import within
 from rotor.requests.lists import Numbers
 from rotor.requests.readers import Custom, Quantity
@@ -354,3 +355,43 @@ SHAPES: dict[str, type[Pulse]] = {
     "table": TabulatedPulse,
     "thz": DipolePulse,
 }  # by their names in scenes
+
+IN_ORDER = {
+    "gaussian": ("peak", "fwhm", "centre"),
+    "switched": ("peak", "rise", "plateau", "fall", "start"),
+    "kick": ("fluence", "time"),
+    "thz": ("peak", "fwhm", "frequency", "centre"),
+}  # the order of the numbers of a shape in a text
+
+
+def pulse_of_numbers(shape: str, text: str, **others: Any) -> Pulse:
+    """A pulse of a shape from numbers separated by commas; others: further fields.
+
+    >>> pulse_of_numbers("kick", "0.5 J/cm2, 2").fluence_j_per_cm2
+    0.5
+    """
+    fields: dict[str, Any] = {field.key: field for field in all_fields(SHAPES[shape]).values()}
+    keys, parts = IN_ORDER[shape], [part.strip() for part in text.split(",")]
+    least, units = sum(fields[key].default is REQUIRED for key in keys), [fields[key].reader.unit for key in keys]
+    if not least <= len(parts) <= len(keys):
+        count = f"{least}" if least == len(keys) else f"{least} to {len(keys)}"
+        raise ValueError(
+            f"{text!r}: expected {count} numbers between commas, in {', '.join(units)}; found {len(parts)}"
+        )
+    values = {fields[key].name: fields[key].read(part, "key") for key, part in zip(keys, parts, strict=False)}
+    return SHAPES[shape](**values, **others)
+
+
+class PulseReader(Choices):
+    """Reader of pulses: also texts of numbers, `1e13 W/cm2, 1 ps` of a Gaussian pulse or `kick 0.5 J/cm2` of a named shape."""
+
+    def _read_line(self, line: str) -> Any:
+        word, _, numbers = line.strip().partition(" ")
+        if "=" in line:
+            return super()._read_line(line)
+        if word in IN_ORDER and numbers:
+            return pulse_of_numbers(word, numbers)
+        return pulse_of_numbers("gaussian", line) if word[:1] in "0123456789.+-" else super()._read_line(line)
+
+
+PULSES = PulseReader("shape", lambda: SHAPES)

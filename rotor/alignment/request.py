@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.alignment.pulse import DEFAULT_TOLERANCE, SHAPES, Pulse
+from rotor.alignment.pulse import DEFAULT_TOLERANCE, PULSES, Pulse
 from rotor.arrays import Floats
 from rotor.requests.budget import ErrorBudget
-from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.knob import Estimate, Knob, Measure, Sought
 from rotor.requests.lists import Pairs
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 REVIVALS = 1.1  # after the pulses by default: the whole peak of the full revival
 LONGEST_PS = 100.0  # default time after the pulses for a top without revivals
 DEFAULT_POINTS = 2001
-PULSES = Choices("shape", lambda: SHAPES)
 FARTHEST_PS = 1e9  # a phase of 2π 1 THz times this time has an error of 1e-6
 
 

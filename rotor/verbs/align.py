@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.alignment.pulse import SHAPES, Axis, Pulse, TabulatedPulse, read_axis
+from rotor.alignment.pulse import Axis, Pulse, TabulatedPulse, pulse_of_numbers, read_axis
 from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
 from rotor.arrays import Floats
 from rotor.reports import top_facts
 from rotor.reports.screen import Table, record_table
-from rotor.requests.field import CONDITIONS, REQUIRED, all_fields, declared_fields
+from rotor.requests.field import CONDITIONS, all_fields, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_fields, within
 from rotor.requests.readers import Quantity
 from rotor.table import counted
@@ -29,21 +29,18 @@ FIELDS = all_fields(AlignRequest)
 _TEXTS = {
     "--pulse": (
         "gaussian",
-        ("peak", "fwhm", "centre"),
         'Gaussian pulse: peak intensity, full width at half maximum[, time]: "1e13 W/cm2, 1 ps"; repeatable',
     ),
     "--switched": (
         "switched",
-        ("peak", "rise", "plateau", "fall", "start"),
         'Switched pulse: "1e12 W/cm2, RISE, PLATEAU, FALL[, START]" (ps); repeatable',
     ),
-    "--kick": ("kick", ("fluence", "time"), 'Kick without duration: "0.5 J/cm2[, TIME]"; repeatable'),
+    "--kick": ("kick", 'Kick without duration: "0.5 J/cm2[, TIME]"; repeatable'),
     "--thz": (
         "thz",
-        ("peak", "fwhm", "frequency", "centre"),
         'Field on the dipole: "100 kV/cm, 1 ps[, 0.3 THz[, TIME]]": peak, width of its envelope, frequency; repeatable',
     ),
-}  # shape of the pulse, order of its numbers and help, by option
+}  # shape of the pulse and help, by option
 
 EXAMPLES = """\
   rotor align OCS --pulse "1e13 W/cm2, 1 ps" --temperature 1 --until 200ps --plot ocs.png --csv ocs.csv
@@ -69,32 +66,16 @@ def read_pulses(typed: Mapping[str, Any]) -> Mapping[str, Any]:
     with within("--polarization"):
         axis = read_axis(typed.get("--polarization", "z"))
     pulses: list[Pulse] = []
-    for option in _TEXTS:
+    for option, (shape, _) in _TEXTS.items():
+        along = {} if shape == "thz" else {"axis": axis}
         with within(option):
-            pulses += [_pulse_of_text(text, option, axis) for text in typed.get(option, ())]
+            pulses += [pulse_of_numbers(shape, text, **along) for text in typed.get(option, ())]
     if "--pulse-table" in typed:
         with within("--pulse-table"):
             pulses.append(_pulse_of_table(typed["--pulse-table"], axis))
     if not pulses:
         raise ValueError('no pulse: give --pulse "1e13 W/cm2, 1 ps", --switched, --kick, --pulse-table or --thz')
     return {"pulses": tuple(pulses)}
-
-
-def _pulse_of_text(text: str, option: str, axis: Axis) -> Pulse:
-    """A pulse from numbers separated by commas."""
-    shape, keys, _ = _TEXTS[option]
-    fields: dict[str, Any] = {field.key: field for field in all_fields(SHAPES[shape]).values()}
-    parts = [part.strip() for part in text.split(",")]
-    least, units = sum(fields[key].default is REQUIRED for key in keys), [fields[key].reader.unit for key in keys]
-    if not least <= len(parts) <= len(keys):
-        count = f"{least}" if least == len(keys) else f"{least} to {len(keys)}"
-        raise ValueError(
-            f"{text!r}: expected {count} numbers between commas, in {', '.join(units)}; found {len(parts)}"
-        )
-    values = {fields[key].name: fields[key].read(part, "key") for key, part in zip(keys, parts, strict=False)}
-    structure: Any = SHAPES[shape]
-    pulse: Pulse = structure(**values) if shape == "thz" else structure(**values, axis=axis)
-    return pulse
 
 
 def _pulse_of_table(path: str, axis: Axis) -> Pulse:
@@ -127,7 +108,9 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
     """The request from a molecule, its pulses and the other inputs."""
     values = read_fields(AlignRequest, entries, subject)
     if not values.get("pulses"):
-        raise ValueError('pulses: expected one or more, such as "gaussian peak=1e13W/cm2 fwhm=1ps"')
+        raise ValueError(
+            'pulses: expected one or more, such as "1e13 W/cm2, 1 ps" or "gaussian peak=1e13W/cm2 fwhm=1ps"'
+        )
     if values.get("state") is not None and "temperature_k" in values and not values.get("classical_molecules"):
         raise NamedError(
             "{temperature_k} and {state}: give one of them; the molecules of one level have no temperature"
@@ -255,7 +238,7 @@ VERB = Verb(
     extras=(
         *(
             Extra(option, "TEXT", help_, panel=CONDITIONS, common=True, many=True)
-            for option, (_, _, help_) in _TEXTS.items()
+            for option, (_, help_) in _TEXTS.items()
         ),
         Extra("--pulse-table", "FILE", "Pulse from a CSV with columns t_ps and intensity_w_per_cm2", panel=CONDITIONS),
         Extra(
