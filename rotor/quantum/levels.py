@@ -6,7 +6,6 @@ Nothing outside this folder computes a row from quantum numbers: `Levels.find` a
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
@@ -24,8 +23,7 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.quantum.spins.scheme import Rotor
-    from rotor.quantum.tensors import Tensors
+    from rotor.quantum.internal_rotation.levels import TorsionMoments
     from rotor.tops.top import Top
 
 
@@ -36,31 +34,6 @@ class Used:
     method: str
     estimate_mhz: float
     tolerance_mhz: float
-
-
-class SpeciesMoments(ABC):
-    """Elements of operators between the blocks of one species without spins, and derivatives of its states."""
-
-    @property
-    @abstractmethod
-    def combined(self) -> bool:
-        """Whether functions of K and -K are combined."""
-
-    @abstractmethod
-    def connect(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> bool:
-        """Whether tensors, by pairs of states, have elements between the states of two blocks of the species."""
-
-    @abstractmethod
-    def reduced(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> NDArray[Any]:
-        """Reduced elements (n_up, n_low) of one component; those of odd rank without their factor i where functions are `combined`."""
-
-    @abstractmethod
-    def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
-        """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
-
-    @abstractmethod
-    def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
-        """∂E/∂c (n, names) of mixtures of the states of blocks by constants of the Hamiltonian without spins."""
 
 
 class SpeciesFunctions(NamedTuple):
@@ -94,7 +67,7 @@ class SolvedBlock:
     start: int = 0
     labels: Ints | None = None
     mixing: Floats | None = None
-    moments: SpeciesMoments | None = None
+    moments: TorsionMoments | None = None
     components: int = 1
     spins: Any = None
 
@@ -257,14 +230,11 @@ class Levels(Table):
         """
         self._refuse_names(quanta)
         here = np.logical_and.reduce([self.quanta[name] == value for name, value in quanta.items()])
-        row = int(here.argmax()) if here.any() else -1
-        if row < 0:
-            label, total = (
-                ", ".join(f"{name} = {value}" for name, value in quanta.items()),
-                "N" if "n" in self.quanta else "J",
-            )
+        if not here.any():
+            label = ", ".join(f"{name} = {value}" for name, value in quanta.items())
+            total = "N" if "n" in self.quanta else "J"
             raise ValueError(f"no level with {label} among {len(self)} levels up to {total} = {self.jmax}")
-        return row
+        return int(here.argmax())
 
     def rows_of(self, **quanta: ArrayLike) -> Ints:
         """Rows of the levels with these quantum numbers, arrays (n,) by name; -1 where there is none.
@@ -347,14 +317,21 @@ def levels_table(
     representation: str | None = None,
     **others: Any,
 ) -> Levels:
-    """Levels with the spin weights of the top or of their state; by default of one component and 2J+1 projections. others: see `Levels`."""
+    """Levels, by default of one component, 2J+1 projections and the spin weights of the top or of their state. others: see `Levels`."""
     ones = np.ones(len(energy_mhz), dtype=np.int64)
     others = {"multiplicity": 2 * quanta["j"] + 1 if "j" in quanta else ones, "components": ones, **others}
+    if "weight" not in others:
+        others["weight"] = _weights_by_state(top, effects, quanta)
+    return Levels(top.kind, representation, jmax, energy_mhz, quanta, effects=effects, **others)
+
+
+def _weights_by_state(top: Top, effects: tuple[QuantumEffect, ...], quanta: Quanta) -> Ints:
+    """Spin weights of the top, or of the states that have theirs."""
     weight = weights_of_quanta(top.kind, quanta, top.spin_weights)
     for state in (state for effect in effects for state in effect.states(top)):
         if state.spin_weights is not None:
             weight = np.where(quanta["v"] == state.v, weights_of_quanta(top.kind, quanta, state.spin_weights), weight)
-    return Levels(top.kind, representation, jmax, energy_mhz, quanta, weight=weight, effects=effects, **others)
+    return weight
 
 
 def levels_of_blocks(

@@ -92,12 +92,12 @@ class LinearBlock(NamedTuple):
 
     def turned(self, functions: Floats) -> LinearBlock:
         """The block over other functions, given in rows over those of this one."""
-        elements = list[WeightedElements]()
-        for parameter, whole in zip(self.parameters.tolist(), self.matrices(), strict=True):
-            matrix = np.tril(functions @ whole @ functions.T)
-            places = np.flatnonzero(matrix)
-            elements.append(WeightedElements(places, matrix.ravel()[places, None], np.array([parameter])))
-        return linear_block(len(functions), elements)
+        matrices = functions @ self.matrices() @ functions.T
+        places = np.flatnonzero(np.tril(matrices.any(axis=0)))
+        return linear_block(
+            len(functions),
+            [WeightedElements(places, matrices.reshape(-1, len(functions) ** 2)[:, places].T, self.parameters)],
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,8 +49,7 @@ def tabulated_line_errors(
     table = top.level_table
     if table is None or table.own_error_mhz is None or not _are_of_constants(top, levels.effects):
         return None
-    quanta = _labels_of_table(levels)
-    rows = table.rows_of({name: quanta[name] for name in table.quanta})
+    rows = _rows_of_table(table, levels)
     return table.line_errors(rows[upper], rows[lower])
 
 
@@ -59,9 +58,14 @@ def tabulated_level_errors(top: Top, levels: Levels) -> Floats | None:
     table = top.level_table
     if table is None or not _are_of_constants(top, levels.effects):
         return None
-    quanta = _labels_of_table(levels)
-    rows = table.rows_of({name: quanta[name] for name in table.quanta})
+    rows = _rows_of_table(table, levels)
     return np.where(rows >= 0, table.error_mhz[rows], np.nan)
+
+
+def _rows_of_table(table: LevelTable, levels: Levels) -> Ints:
+    """The row of each level in a table."""
+    quanta = _labels_of_table(levels)
+    return table.rows_of({name: quanta[name] for name in table.quanta})
 
 
 def _labels_of_table(levels: Levels) -> dict[str, Ints]:

@@ -107,20 +107,20 @@ def stark_map(
 def projections(
     top: Top, effects: Sequence[QuantumEffect], m_values: Sequence[float] | None, j_highest: int
 ) -> tuple[float, ...]:
-    """|M| of the states in rising order, |M_F| of a top with spins; ValueError for values that do not occur with these spins."""
-    if not any(effect.spins(top) for effect in effects):
-        return checked_m(m_values, j_highest)
-    from rotor.quantum.spins import scheme_of
+    """|M| of the states in rising order, |M_F| of a top with spins; ValueError for values that do not occur."""
+    total = 0
+    if any(effect.spins(top) for effect in effects):
+        from rotor.quantum.spins import scheme_of
 
-    total = scheme_of(top, tuple(effects)).total
+        total = scheme_of(top, tuple(effects)).total
     possible = range(total % 2, 2 * j_highest + total + 1, 2)
-    values = tuple(possible) if m_values is None else tuple(sorted({round(2 * m) for m in m_values}))
-    if not values or not set(values) <= set(possible) or (m_values is not None and any((2 * m) % 1 for m in m_values)):
+    values = sorted({2 * m for m in m_values}) if m_values is not None else possible
+    if not values or not set(values) <= set(possible):
         raise ValueError(
-            f"M_F of {list(m_values or ())}: expected are {possible[0] / 2:g}, {possible[0] / 2 + 1:g} ... {possible[-1] / 2:g} "
+            f"m_values: {list(m_values or ())}: expected numbers from {possible[0] / 2:g} to {possible[-1] / 2:g} in steps of 1 "
             "(M and -M coincide)"
         )
-    return tuple(m / 2 if m % 2 else m // 2 for m in values)
+    return tuple(m / 2 if m % 2 else int(m) // 2 for m in values)
 
 
 def checked_direction(direction: Sequence[float]) -> tuple[float, float, float]:
@@ -140,16 +140,6 @@ def checked_j(j_highest: int) -> int:
     if not 0 <= j_highest <= 100:
         raise ValueError(f"j_highest: states up to J = {j_highest}: expected a whole number from 0 to 100")
     return int(j_highest)
-
-
-def checked_m(m_values: Sequence[float] | None, j_highest: int) -> tuple[int, ...]:
-    """|M| from 0 to J, each once, all for None; ValueError for others."""
-    values = tuple(range(j_highest + 1)) if m_values is None else tuple(sorted({int(m) for m in m_values}))
-    if not values or not all(0 <= m <= j_highest for m in values) or any(m % 1 for m in m_values or ()):
-        raise ValueError(
-            f"m_values: {list(m_values or ())}: expected whole numbers from 0 to J = {j_highest} (M and -M coincide)"
-        )
-    return values
 
 
 def acting(

@@ -20,7 +20,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.estimates.derivatives import expectations
 from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
-from rotor.quantum.wang.wang_matrix import elements_by_order, order_of, scalar_energy
+from rotor.quantum.wang.wang_matrix import elements_by_order, order_of
 from rotor.table import counted
 from rotor.tops.constants.operators import Operators
 
@@ -54,7 +54,7 @@ def order_sizes_mhz(
 def _row_bound(operators: Operators, j: int, kmax: int) -> float:
     """The largest Σ_K' |⟨K'|H|K⟩| over |K| ≤ kmax."""
     k, multiplet = 2 * order_of(operators) + np.arange(kmax + 1), [row for (row,) in elements_by_order(operators, [j])]
-    rows = np.abs(multiplet[0][k] + scalar_energy(operators, j))
+    rows = np.abs(multiplet[0][k])
     for n, elements in enumerate(multiplet[1:], 1):
         rows += np.abs(elements[k]) + np.abs(elements[k - 2 * n])
     return float(rows.max())

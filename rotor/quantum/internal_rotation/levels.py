@@ -27,7 +27,7 @@ from rotor.quantum.internal_rotation.rho_axis_tensors import (
 )
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels, states_of
-from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
+from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, levels_table, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.spins.scheme import Rotor
@@ -47,8 +47,8 @@ MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a who
 
 
 @dataclass(frozen=True, eq=False)
-class TorsionMoments(SpeciesMoments):
-    """Operators of one species; elements between functions are computed at first use.
+class TorsionMoments:
+    """Operators of one species and derivatives of its states; elements between functions are computed at first use.
 
     chain: dependence of F, ρ and its direction on constants of principal axes. further: operators of the quantities of the chain that are
     no coefficients of the Hamiltonian, by name.
@@ -70,7 +70,7 @@ class TorsionMoments(SpeciesMoments):
         return (up.basis.number, low.basis.number) in self._between(tensors)
 
     def reduced(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> NDArray[Any]:
-        """Reduced elements (n_up, n_low) of a tensor."""
+        """Reduced elements (n_up, n_low) of a tensor; those of odd rank without their factor i where functions are `combined`."""
         return _contracted(self._between(tensors)[up.basis.number, low.basis.number], up.vectors, low.vectors)
 
     def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
@@ -216,21 +216,8 @@ def joined_levels(
 ) -> Levels:  # fmt: skip
     """Levels from columns of quantum numbers, components, weights and, with spins, projections in space, piece by piece."""
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
-    components, weight = columns.pop("components"), columns.pop("weight")
-    multiplicity = columns.pop("multiplicity") if "multiplicity" in columns else 2 * columns["j"] + 1
-    return Levels(
-        kind=top.kind,
-        representation=REPRESENTATION,
-        jmax=jmax,
-        energy_mhz=energies,
-        quanta=columns,
-        multiplicity=multiplicity,
-        components=components,
-        weight=weight,
-        halves=halves,
-        effects=effects,
-        blocks=blocks,
-    )
+    others: Any = {name: columns.pop(name) for name in ("components", "weight", "multiplicity") if name in columns}
+    return levels_table(top, effects, jmax, energies, columns, REPRESENTATION, blocks=blocks, halves=halves, **others)
 
 
 def refuse_axes(top: Top) -> None:

@@ -3,7 +3,7 @@
 Blocks that have the same states v and kinds of Wang functions, and differ only in N, form a stack, padded with zeros to one shape.
 Elements between two stacks with a fixed N' - N are one array, computed for all N by the formulas of `tensors` and `operators` and
 contracted by one matrix product. Functions |N K⟩ of axial tops, K a good quantum number, are blocks of one function; those of a state v
-are one stack. States of a species of internal rotation bring their elements along (`levels.SpeciesMoments`), which may be complex.
+are one stack. States of a species of internal rotation bring their elements along (`TorsionMoments`), which may be complex.
 """
 
 from __future__ import annotations
@@ -11,18 +11,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
-from rotor.quantum.levels import SolvedBlock, SpeciesMoments
+from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.scheme import AxialState, Fixed, Rotor
 from rotor.quantum.spins.stack_elements import Pairs, Section, both_signs, rotor_elements
 from rotor.quantum.tensors import Tensors, rank_of
 from rotor.quantum.wang.basis import WangBlock
+
+if TYPE_CHECKING:
+    from rotor.quantum.internal_rotation.levels import TorsionMoments
 
 _REACH, _RISES_OF_K = 2, range(-2, 3)  # largest differences of N and of K that an operator connects
 _LIKE, _SMALL = 1.5, 16  # largest ratio of sizes of blocks that share a stack, and sizes that all do
@@ -212,7 +215,7 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors, representation:
 
 
 def _between_species(
-    stacks: Sequence[Stack], reach: int, operator: Callable[[SpeciesMoments], BetweenStates]
+    stacks: Sequence[Stack], reach: int, operator: Callable[[TorsionMoments], BetweenStates]
 ) -> Iterator[Contracted]:
     """Elements between states of species whose N differ by at most `reach`, each pair of blocks once, the higher number first."""
     for up, low, pairs in _near(stacks, reach):
@@ -232,7 +235,7 @@ def _between_species(
             yield Contracted(up, low, pairs, matrices)
 
 
-def _species_pieces(pieces: Sequence[Piece], moments: SpeciesMoments) -> BetweenStates:
+def _species_pieces(pieces: Sequence[Piece], moments: TorsionMoments) -> BetweenStates:
     """Elements of a sum of pieces between states of a species."""
     operators = [(piece.value, moments.beside_spins(piece.rotor)) for piece in pieces]
 
@@ -243,7 +246,7 @@ def _species_pieces(pieces: Sequence[Piece], moments: SpeciesMoments) -> Between
     return between
 
 
-def _species_tensor(tensors: Tensors, moments: SpeciesMoments) -> BetweenStates:
+def _species_tensor(tensors: Tensors, moments: TorsionMoments) -> BetweenStates:
     """Elements of a tensor between states of a species, times the root of their number of components."""
 
     def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:

@@ -46,7 +46,7 @@ def order_of(operators: Iterable[Powers]) -> int:
 
 
 def elements_by_order(operators: Operators, js: Sequence[int]) -> list[Floats]:
-    """⟨K+2n|H|K⟩ by n, without the scalar part, (J, K) for K from -2 `order_of` to the highest J; zero for n > 0 and K + 2n beyond J."""
+    """⟨K+2n|H|K⟩ by n, (J, K) for K from -2 `order_of` to the highest J; zero for n > 0 and K + 2n beyond J."""
     order, highest = order_of(operators), max(js)
     k, j = np.arange(-2 * order, highest + 2 * order + 1), np.array(js)[:, None]
     steps = np.sqrt(np.maximum((j - k) * (j + k + 1), 0))  # elements of J₊ over |J K⟩; zero beyond K = J
@@ -56,7 +56,7 @@ def elements_by_order(operators: Operators, js: Sequence[int]) -> list[Floats]:
 
 def _elements_of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: Floats) -> Floats:
     """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p: (J, K)."""
-    powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n and (n or q)]
+    powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n]
     coefficients = np.zeros((len(js), 1 + max((q for _, q, _ in powers), default=0)))
     for row, j in enumerate(js):
         x = float(j * (j + 1))
@@ -113,13 +113,13 @@ class WangRows(NamedTuple):
 
 def block_bands(operators: Operators, blocks: Sequence[WangBlock]) -> Iterator[list[Floats]]:
     """Diagonals of the matrix of each block without the scalar part; the n-th has the elements (i+n, i), (size - n,)."""
-    order = order_of(operators)
+    order, others = order_of(operators), {powers: c for powers, c in operators.items() if any(powers[1:])}
     for first in range(0, len(blocks), AT_ONCE_BLOCKS):
         chunk = blocks[first : first + AT_ONCE_BLOCKS]
         js, rows = WangRows.from_blocks(chunk, [block.size for block in chunk])
         diagonals = [np.zeros(rows.k.shape) for _ in range(order + 1)]
         with np.errstate(over="ignore", invalid="ignore"):  # reported where the block is diagonalised
-            for n, elements in enumerate(elements_by_order(operators, js)):
+            for n, elements in enumerate(elements_by_order(others, js)):
                 rows.add(elements, n, order, diagonals)
         for number, block in enumerate(chunk):
             yield [diagonal[number, : block.size - n] for n, diagonal in enumerate(diagonals[: block.size])]
@@ -221,20 +221,8 @@ def unit_diagonals(
     taken: how many of the states of each block.
     """
     js, rows = WangRows.from_blocks(blocks, taken)
-    j = np.array(js, dtype=float)[:, None]
-    order = max((n for _, n in units), default=0)
-    out = tuple(np.zeros((*rows.k.shape, len(units))) for _ in range(order + 1))
+    out = tuple(np.zeros((*rows.k.shape, len(units))) for _ in range(order_of((0, q, n) for q, n in units) + 1))
     for place, (q, n) in enumerate(units):
-        elements = _elements(j, np.arange(-2.0 * n, js[-1] + 1), q, n)
+        elements = elements_by_order({(0, q, n): 1.0}, js)[-1]
         rows.add(elements, n, n, [diagonal[:, :, place] for diagonal in out])
     return out
-
-
-def _elements(j: Floats, k: Floats, q: int, n: int) -> Floats:
-    """⟨K+2n|½[Jz^2q, J₊^2n + J₋^2n]₊|K⟩ (J, K), K^2q for n = 0."""
-    if n == 0:
-        return np.asarray(k ** (2 * q) + 0.0 * j)
-    squared = np.ones_like(j * k)
-    for i in range(2 * n):
-        squared = squared * np.maximum((j - k - i) * (j + k + i + 1), 0.0)
-    return np.asarray(0.5 * ((k + 2 * n) ** (2 * q) + k ** (2 * q)) * np.sqrt(squared))
