@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -69,9 +70,8 @@ def coupled_levels(
     different spin weight.
     """
     all_j = range(jmin, jmax + 1)
-    pieces = [(model, [j]) for j in all_j] if executor else [(model, all_j)]
     solved = (
-        executor.map(solve_coupled, *zip(*pieces, strict=True)) if executor else (solve_coupled(*p) for p in pieces)
+        executor.map(partial(solve_coupled, model), [[j] for j in all_j]) if executor else [solve_coupled(model, all_j)]
     )
     blocks = tuple(placed(block for blocks_of_piece in solved for block in blocks_of_piece))
 

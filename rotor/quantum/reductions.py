@@ -25,14 +25,15 @@ constants are refused: they would change by as much as they are worth.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
+from rotor.quantum.effects.watson import operators_by_name
 from rotor.tops.constants.constants import Constants
 from rotor.tops.constants.covariance import Covariance
-from rotor.tops.constants.operators import Operators, Powers, axis_order, distortion_terms
+from rotor.tops.constants.operators import Operators, Powers, added, axis_order, distortion_terms
 
 # the quartic and quadratic terms by (p, q, n), and what each is in Jα⁴, JαJα JβJβ + JβJβ JαJα, Jα², for (x, y, z, xy, yz, zx)
 _TERMS: tuple[Powers, ...] = (
@@ -104,9 +105,8 @@ def _converted(
         same = _labelled(constants, dict(constants.values), reduction, representation, note)
         return Conversion(same, 0.0, note, covariance)
 
-    operators = rigid_operators(constants) | centrifugal_operators(constants)
     way = (str(constants.representation), str(reduction), representation)
-    values, s = _values(operators, *way)
+    values, s = _values(constants, constants.values, *way)
     note = (
         f"{constants.reduction} in {constants.representation} to {reduction} in {representation}, to first order in the "
         f"quartic constants, s111 = {4 * s:.3g}; it holds while |s111| J³ is far below 1"
@@ -118,8 +118,11 @@ def _converted(
     )
 
 
-def _values(operators: Operators, old: str, reduction: str, new: str) -> tuple[dict[str, float], float]:
-    """The new constants by name, and the turn s, of an operator written in the axes of `old`."""
+def _values(
+    constants: Constants, values: Mapping[str, float], old: str, reduction: str, new: str
+) -> tuple[dict[str, float], float]:
+    """The new constants by name, and the turn s, of values of the constants in the axes of `old`."""
+    operators = added((terms, values[name]) for name, terms in operators_by_name(constants).items())
     exchanged = _exchange_axes(operators, axis_order(old), axis_order(new))
     s = _turn(exchanged, reduction)
     return _named(_turned(exchanged, s), reduction, new), s
@@ -127,25 +130,17 @@ def _values(operators: Operators, old: str, reduction: str, new: str) -> tuple[d
 
 def _carried(constants: Constants, covariance: Covariance, way: tuple[str, str, str]) -> Covariance:
     """J C Jᵀ, J the derivatives of new constants by old ones, from differences of a smooth function."""
-    by_name = operators_by_name(constants)
-    operators = rigid_operators(constants) | centrifugal_operators(constants)
-
-    def moved(name: str, step: float) -> list[float]:
-        return list(_values(_plus(operators, by_name[name], step), *way)[0].values())
-
-    steps = [1e-6 * (abs(constants[name]) or 1e3) for name in covariance.names]
-    differences = [
-        np.subtract(moved(name, step), moved(name, -step)) / (2 * step)
-        for name, step in zip(covariance.names, steps, strict=True)
-    ]
-    jacobian = np.stack(differences, axis=1)
+    columns, names = [], tuple[str, ...]()
+    for name in covariance.names:
+        step = 1e-6 * (abs(constants[name]) or 1e3)
+        up, down = (
+            _values(constants, {**constants.values, name: constants[name] + sign * step}, *way)[0] for sign in (1, -1)
+        )
+        columns.append(np.subtract(list(up.values()), list(down.values())) / (2 * step))
+        names = tuple(up)
+    jacobian = np.stack(columns, axis=1)
     matrix = jacobian @ covariance.matrix_mhz2 @ jacobian.T
-    return Covariance(tuple(_values(operators, *way)[0]), (matrix + matrix.T) / 2)
-
-
-def _plus(operators: Operators, others: Operators, factor: float) -> Operators:
-    sums = {powers: operators.get(powers, 0.0) + factor * value for powers, value in others.items()}
-    return operators | sums
+    return Covariance(names, (matrix + matrix.T) / 2)
 
 
 def _refuse(constants: Constants, reduction: str | None, representation: str) -> None:
@@ -154,8 +149,7 @@ def _refuse(constants: Constants, reduction: str | None, representation: str) ->
     if reduction not in ("A", "S", None):
         raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
     axis_order(representation)  # refuses one that does not exist
-    quartic = [n for n, term in distortion_terms("asymmetric", constants.reduction).items() if _order(term) == 2]
-    higher = [name for name in constants.values if name not in (*"ABC", *quartic)]
+    higher = [name for name in constants.values if name not in (*"ABC", *_quartic(constants.reduction))]
     if higher:
         raise ValueError(
             f"constants with {', '.join(higher)}: the conversion is of first order in quartic constants and would "
@@ -163,8 +157,10 @@ def _refuse(constants: Constants, reduction: str | None, representation: str) ->
         )
 
 
-def _order(term: Operators) -> int:
-    return max(sum(powers) for powers in term)
+def _quartic(reduction: str | None) -> dict[str, Operators]:
+    """The terms of the quartic constants of a reduction, one each."""
+    terms = distortion_terms("asymmetric", reduction)
+    return {name: term for name, term in terms.items() if max(map(sum, term)) == 2}
 
 
 def _exchange_axes(operators: Operators, old: str, new: str) -> Operators:
@@ -205,10 +201,9 @@ def _named(operators: Operators, reduction: str, representation: str) -> dict[st
         zip(axis_order(representation).upper(), (mean + 2 * across, mean - 2 * across, mean + along), strict=True)
     )
     values = {name: rigid[name] for name in "ABC"}
-    for name, term in distortion_terms("asymmetric", reduction).items():
-        if _order(term) == 2:
-            ((powers, sign),) = term.items()
-            values[name] = sign * operators[powers]
+    for name, term in _quartic(reduction).items():
+        ((powers, sign),) = term.items()
+        values[name] = sign * operators[powers]
     return values
 
 

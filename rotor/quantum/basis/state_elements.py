@@ -130,18 +130,11 @@ def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> 
     if not blocks:
         return {}
     rising = sorted(blocks)
-    diagonals = unit_diagonals(rising, [block.size for block in rising], powers[1:])
-    size = max(block.size for block in rising)
-    ones = np.arange(size)[None, :] < np.array([block.size for block in rising])[:, None]
-    numbers, functions = np.nonzero(ones)
-    pieces = [(numbers, functions, np.zeros_like(functions), np.zeros_like(functions))]
-    elements = [np.ones(len(functions))]
-    for d, values in enumerate(diagonals):
+    pieces = []
+    for d, values in enumerate(unit_diagonals(rising, [block.size for block in rising], powers)):
         places = np.nonzero(values)
-        pieces.append((places[0], places[1], np.full_like(places[0], d), places[2] + 1))
-        elements.append(values[places])
-    b, i, distance, unit = (np.concatenate(column) for column in zip(*pieces, strict=True))
-    value = np.concatenate(elements)
+        pieces.append((*places, np.full_like(places[0], d), values[places]))
+    b, i, unit, distance, value = (np.concatenate(column) for column in zip(*pieces, strict=True))
     order = np.argsort(b, kind="stable")
     bounds = np.searchsorted(b[order], np.arange(len(rising) + 1))
     out = {}
@@ -162,13 +155,11 @@ def _wang_stack(blocks: Sequence[WangBlock], terms: StateTerms, count: int) -> L
     """Wang blocks in order of size."""
     sizes, j = np.array([(block.size, block.j) for block in blocks]).T
     size, starts = int(sizes[-1]), np.cumsum(sizes**2) - sizes**2
-    diagonals = unit_diagonals(blocks, sizes.tolist(), terms.powers[1:])[:size]
+    diagonals = unit_diagonals(blocks, sizes.tolist(), terms.powers)[:size]
     distance, columns = numbers_in_runs(size - np.arange(len(diagonals)))
     rows = columns + distance
     inside = rows < sizes[:, None]
-    factors = np.empty((*inside.shape, len(terms.powers)))
-    factors[:, :, 0] = inside & (distance == 0)
-    np.concatenate([values[:, : size - d] for d, values in enumerate(diagonals)], axis=1, out=factors[:, :, 1:])
+    factors = np.concatenate([values[:, : size - d] for d, values in enumerate(diagonals)], axis=1)
     half = np.where(distance, 0.5, 1.0)
     factors /= half[:, None]
     places = np.where(inside, starts[:, None] + rows * sizes[:, None] + columns, (sizes**2).sum())

@@ -120,11 +120,8 @@ class BetweenStates:
         return WangElements(paths.up[pair], paths.low[pair], *places, values), bool((imaginary > least).any())
 
     def _paths_of(self, steps: Steps) -> _Paths:
-        if steps not in self._paths:
-            self._paths[steps] = self._new_paths(steps)
-        return self._paths[steps]
-
-    def _new_paths(self, steps: Steps) -> _Paths:
+        if steps in self._paths:
+            return self._paths[steps]
         up, low, none = self._up, self._low, np.zeros(0, dtype=np.int64)
         pieces = [(none, none, none, np.zeros(0, dtype=np.complex128))]
         for number, (rise, step) in enumerate(steps):
@@ -141,4 +138,5 @@ class BetweenStates:
         starts = np.flatnonzero(np.diff(pairs[first], prepend=-1))
         pair = np.cumsum(np.bincount(starts, minlength=len(first))) - 1
         blocks = np.divmod(pairs[first][starts], len(low.blocks))
-        return _Paths(source, weight, place, rows[first], columns[first], pair, starts, *blocks)
+        self._paths[steps] = _Paths(source, weight, place, rows[first], columns[first], pair, starts, *blocks)
+        return self._paths[steps]

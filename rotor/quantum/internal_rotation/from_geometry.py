@@ -59,8 +59,7 @@ def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") ->
     values, settings = values_and_settings(given.split())
     values = _for_each(values, numbers)
     exchange = _exchange(top, groups)
-    constants: dict[str, Any] = {}
-    constants |= _kinetic_constants(top, groups, numbers, exchange)
+    constants: dict[str, Any] = {**_kinetic_constants(top, groups, numbers, exchange)}
     errors = {name: F0_ERROR * value for name, value in constants.items() if name.startswith("F0")}
     origins: dict[str, list[str]] = {}
     alike = exchange is not None and values.get("V3_1") == values.get("V3_2")
@@ -76,9 +75,11 @@ def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") ->
     texts += [f"{', '.join(names)} = {origin}" for origin, names in origins.items()]
     texts += ["coupling of the potentials (V12) left out"] if numbers[0] and not PAIRS.keys() & values else []
     source = "; ".join(texts)
-    settings |= {name: value for name, value in _nuclei(top, groups, exchange).items() if name not in settings}
+    nuclei = {"spin_states": _spin_states(top, groups), "exchanged": _exchanged_pairs(top, groups, exchange)}
     uncertain = {name: error for name, error in errors.items() if name not in values}
-    internal = InternalRotationConstants(constants | values, "PAM", uncertainties=uncertain, source=source, **settings)
+    internal = InternalRotationConstants(
+        constants | values, "PAM", uncertainties=uncertain, source=source, **(nuclei | settings)
+    )
     return replace(top, internal_rotation=internal, notes=(*top.notes, f"internal rotation: {source}"))
 
 
@@ -87,11 +88,6 @@ def _for_each(values: Mapping[str, str], numbers: Sequence[str]) -> dict[str, st
     common = {name: value for name, value in values.items() if name in ("V3", "V6")}
     each = {f"{name}{number}": value for name, value in common.items() for number in numbers}
     return each | {name: value for name, value in values.items() if name not in common}
-
-
-def _nuclei(top: Top, groups: Sequence[MethylGroup], exchange: Operation | None) -> dict[str, Any]:
-    """The settings that describe the nuclei: those that turn, and those that an exchange of the groups exchanges."""
-    return {"spin_states": _spin_states(top, groups), "exchanged": _exchanged_pairs(top, groups, exchange)}
 
 
 def _in_prolate_axes(top: Top) -> Top:
@@ -186,14 +182,14 @@ def _barriers(top: Top, group: MethylGroup, calculator: Any, given: str | None) 
 def _scanned(top: Top, group: MethylGroup, calculator: Any) -> tuple[dict[str, float], BondScan]:
     """V3 and V6 (MHz) of a relaxed scan about the bond of the group, α = 0 at the minimum of the lowest term; and the scan."""
     assert top.molecule is not None
-    carbon = next(i for i in bonded_atoms(top.molecule)[group.hydrogens[0]].tolist())
-    bearer = next(i for i in bonded_atoms(top.molecule)[carbon].tolist() if i not in group.hydrogens)
+    bonds = bonded_atoms(top.molecule)
+    carbon = int(bonds[group.hydrogens[0]][0])
+    bearer = next(i for i in bonds[carbon].tolist() if i not in group.hydrogens)
     rotation = bond_rotation(top.molecule, f"{bearer + 1}-{carbon + 1}")
     scan = relaxed_scan(rotation, calculator, points=36)
     series = potential_of_scan(scan, rotation)
-    terms = dict(
-        zip(series.n.tolist(), series.cosines - 1j * series.sines, strict=True)
-    )  # of exp(inα), from n = 3 or 6 up
+    # of exp(inα), from n = 3 or 6 up
+    terms = dict(zip(series.n.tolist(), series.cosines - 1j * series.sines, strict=True))
     lowest = min(terms)
     start = np.angle(-terms[lowest]) / -lowest  # angle of its minimum: the lowest term is -|t| cos n(α - start)
     return {f"V{n}": float(-2 * (terms.get(n, 0.0) * np.exp(1j * n * start)).real) for n in (3, 6)}, scan

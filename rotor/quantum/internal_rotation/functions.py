@@ -58,24 +58,14 @@ class TorsionRotation:
 
     @cached_property
     def plain_labels(self) -> Mapping[str, Ints]:
-        """The labels of |J K t s) or |J K⟩|K t⟩."""
-        j, k, t, s = (np.concatenate(column) for column in zip(*self._groups, strict=True))
-        return {"J": j, "K": k, "t": t, "s": s}
-
-    @cached_property
-    def _groups(self) -> list[tuple[Ints, Ints, Ints, Ints]]:
-        """J, K, t, s of the functions: all those with s ≥ 0 by J and K, then those with s = -1."""
-        j, k = self.rotation.labels["J"], self.rotation.labels["K"]
-        t = np.arange(self.torsion.count)
-        signs = (1, -1) if self.folded else (0,)
-        chosen = k >= 0 if self.folded else np.ones(len(k), dtype=bool)
-        groups = []
-        for sign in signs:
-            jj, tt = np.broadcast_arrays(j[chosen, None], t)
-            kk = np.broadcast_to(k[chosen, None], tt.shape)
-            exists = (kk > 0) | (self.torsion.parity[tt] == sign) if self.folded else np.ones(tt.shape, dtype=bool)
-            groups.append((jj[exists], kk[exists], tt[exists], np.full(int(exists.sum()), sign)))
-        return groups
+        """The labels of |J K t s), those with s = 1 before those with s = -1, or of |J K⟩|K t⟩."""
+        signs, count = (1, -1) if self.folded else (0,), self.torsion.count
+        s, row, t = (
+            each.ravel() for each in np.meshgrid(signs, np.arange(len(self.rotation)), range(count), indexing="ij")
+        )
+        j, k = self.rotation.labels["J"][row], self.rotation.labels["K"][row]
+        exists = (s == 0) | (k > 0) | ((k == 0) & (self.torsion.parity[t] == s))
+        return {"J": j[exists], "K": k[exists], "t": t[exists], "s": s[exists]}
 
     @cached_property
     def _rows(self) -> Ints:
@@ -191,11 +181,8 @@ class TorsionRotation:
             row_index = self._rows[(sign_of_pair < 0).astype(int), first]
             column_index = self._rows[int(column_sign < 0), second]
             pieces.append((row_index, column_index, summed))
-        return (
-            np.concatenate([piece[0] for piece in pieces]),
-            np.concatenate([piece[1] for piece in pieces]),
-            np.concatenate([piece[2] for piece in pieces], axis=1),
-        )
+        all_rows, all_columns, all_values = zip(*pieces, strict=True)
+        return np.concatenate(all_rows), np.concatenate(all_columns), np.concatenate(all_values, axis=1)
 
     def _gathered(self, count: int, rows: Ints, columns: Ints, values: NDArray[Any]) -> Elements:
         """Elements between functions by entry and t from values (terms, entries, t', t), without zeros and absent functions."""

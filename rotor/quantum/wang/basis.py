@@ -131,17 +131,6 @@ def _kinds_of_blocks(parity_of_j: int, representation: str) -> list[tuple[str, i
     return sorted((_species(parity_of_j, first, sign, axes), first, sign) for first, sign in _WANG)
 
 
-def first_name(j: int, species: str) -> tuple[int, int]:
-    """Ka of the lowest state of a block and Ka + Kc, J or J + 1 by the parities; Ka rises by two through the block.
-
-    >>> first_name(2, "ee"), first_name(3, "oo")
-    ((0, 2), (1, 4))
-    """
-    ka_odd, kc_odd = species[0] == "o", species[1] == "o"
-    at_j = (ka_odd + kc_odd) % 2 == j % 2  # Ka + Kc = J, else J + 1
-    return 1 if ka_odd else (0 if at_j else 2), j if at_j else j + 1
-
-
 def limited(block: WangBlock, kmin: int, kmax: int) -> WangBlock | None:
     """The part of a block with `kmin` ≤ K ≤ `kmax`; None if it is empty.
 
@@ -180,8 +169,10 @@ def names_of_blocks(
 
 
 def _first_of_part(block: WangBlock, representation: str) -> tuple[int, int]:
-    """Ka of the lowest state of a block, of which some K may be left out, and Ka + Kc."""
-    first, total = first_name(block.j, block.species)
+    """Ka of the lowest state of a block, of which some K may be left out, and Ka + Kc, J or J + 1; Ka rises by two in the block."""
+    ka_odd, kc_odd = (parity == "o" for parity in block.species)
+    at_j = (ka_odd + kc_odd) % 2 == block.j % 2
+    first, total = 1 if ka_odd else (0 if at_j else 2), block.j if at_j else block.j + 1
     whole = (block.j - block.first_k % 2) // 2 + 1 - (block.first_k % 2 == 0 and block.sign < 0)
     if block.size == whole:
         return first, total

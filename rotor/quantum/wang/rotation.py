@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
@@ -156,17 +157,14 @@ def _in_wang_blocks(
     jmax: int,
     vectors: bool,
     executor: Executor | None,
-    limits: tuple[int, int] | None = None,
-    below_mhz: float = math.inf,
+    limits: tuple[int, int] | None,
+    below_mhz: float,
 ) -> Levels:
     """Levels from Wang blocks, in parallel over J with an executor."""
     representation = representation_of(top)
     all_j = range(jmin, jmax + 1)
-    pieces = [
-        (operators, js, representation, vectors, limits, below_mhz)
-        for js in ([[j] for j in all_j] if executor else [all_j])
-    ]
-    solved = executor.map(_solve, *zip(*pieces, strict=True)) if executor else (_solve(*piece) for piece in pieces)
+    solve = partial(_solve, operators, representation, vectors, limits, below_mhz)
+    solved = executor.map(solve, [[j] for j in all_j]) if executor else [solve(all_j)]
     whole = [block for solutions in solved for block in solutions]
     functions, sizes = [basis for basis, _, _ in whole], [len(energies) for _, energies, _ in whole]
     blocks = tuple(map(single_block, *zip(*whole, strict=True), accumulate(sizes, initial=0)))
@@ -177,8 +175,8 @@ def _in_wang_blocks(
 
 
 def _solve(
-    operators: Operators, js: Iterable[int], representation: str, vectors: bool = True,
-    limits: tuple[int, int] | None = None, below_mhz: float = math.inf,
+    operators: Operators, representation: str, vectors: bool, limits: tuple[int, int] | None, below_mhz: float,
+    js: Iterable[int],
 ) -> list[tuple[WangBlock, Floats, Floats]]:  # fmt: skip
     """Solve the Wang blocks of several J: (block, energies in MHz, eigenvectors) by J in the order ee, eo, oe, oo; K within `limits`."""
     pieces = _with_bands(operators, [block for j in js for block in blocks_within(j, representation, limits)])

@@ -59,18 +59,13 @@ def tensor_eigenvalues(j: int, sign: int = 1) -> tuple[NDArray[np.str_], Floats]
     >>> irreps.tolist(), omega.round(9).tolist()
     (['E', 'F2'], [-36.0, 24.0])
     """
-    eigenvalues = {"F1": _eigenvalues(_block(j, "A2")), "F2": _eigenvalues(_block(j, "B2"))}
+    eigenvalues = {"F1": np.linalg.eigvalsh(_block(j, "A2")), "F2": np.linalg.eigvalsh(_block(j, "B2"))}
     eigenvalues["A1"], eigenvalues["E"] = _one_and_two_dimensional(j, "A1")
     eigenvalues["A2"], _ = _one_and_two_dimensional(j, "B1")
 
     irreps = np.repeat(CUBIC_IRREPS, [len(eigenvalues[irrep]) for irrep in CUBIC_IRREPS])
     omega = np.concatenate([sign * np.sort(sign * eigenvalues[irrep]) for irrep in CUBIC_IRREPS])
     return irreps, omega + scalar_energy(CUBIC_TENSOR, j)
-
-
-def _eigenvalues(matrix: Floats) -> Floats:
-    """Eigenvalues of a symmetric matrix."""
-    return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64)
 
 
 def _wang(j: int, name: str) -> tuple[WangBlock, slice]:
@@ -99,7 +94,7 @@ def _one_and_two_dimensional(j: int, name: str) -> tuple[Floats, Floats]:
     matrix, turn = _block(j, name), _threefold_turn(j, name)
     characters, states = np.linalg.eigh(turn)
     a_states, e_states = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½
-    return _eigenvalues(a_states.T @ matrix @ a_states), _eigenvalues(e_states.T @ matrix @ e_states)
+    return np.linalg.eigvalsh(a_states.T @ matrix @ a_states), np.linalg.eigvalsh(e_states.T @ matrix @ e_states)
 
 
 def _threefold_turn(j: int, name: str) -> Floats:
