@@ -32,13 +32,14 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
     >>> [effect.name for effect in spin_effects(top)]
     ['nuclear quadrupole']
     """
-    if top.spin_constants is None:
+    constants = top.spin_constants
+    if constants is None:
         return ()
-    _refuse_like_nuclei(top)
-    _refuse_unknown_states(top)
+    _refuse_like_nuclei(top, constants)
+    _refuse_unknown_states(top, constants)
     if top.kind == "linear":
-        _refuse_across_a_line(top)
-    return _effects(top.spin_constants)
+        _refuse_across_a_line(constants)
+    return _effects(constants)
 
 
 def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
@@ -52,22 +53,20 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
         for name, twice in constants.twice.items()
     )
     values: dict[type[SpinEffect], dict[str, float]] = {}
+    kind_of = {symbol: kind for kind in kinds for symbol in kind.symbols}
     for name, value in constants.values.items():
-        symbols = [symbol for kind in kinds for symbol in kind.symbols]
-        symbol = parse_name(name).symbol if name.startswith(tuple(symbols)) else ""
-        kind = next((kind for kind in kinds if symbol in kind.symbols), None)
-        if kind is None:
-            hint = did_you_mean(name.partition("(")[0], symbols)
-            raise ValueError(f"{name}: known constants of spins are {first_names(symbols)}{hint}")
-        values.setdefault(kind, {})[name] = value
+        symbol = parse_name(name).symbol if name.startswith(tuple(kind_of)) else ""
+        if symbol not in kind_of:
+            hint = did_you_mean(name.partition("(")[0], kind_of)
+            raise ValueError(f"{name}: known constants of spins are {first_names(kind_of)}{hint}")
+        values.setdefault(kind_of[symbol], {})[name] = value
     return tuple(kind(values[kind], spins) for kind in kinds if kind in values)
 
 
-def _refuse_unknown_states(top: Top) -> None:
+def _refuse_unknown_states(top: Top, constants: SpinConstants) -> None:
     """Raise ValueError for a spin constant of a state that the top does not have."""
-    assert top.spin_constants is not None
     count = top.state_count
-    for name in top.spin_constants.values:
+    for name in constants.values:
         states = parse_name(name).states
         if states and states[1] >= count:
             raise ValueError(
@@ -75,10 +74,9 @@ def _refuse_unknown_states(top: Top) -> None:
             )
 
 
-def _refuse_across_a_line(top: Top) -> None:
+def _refuse_across_a_line(constants: SpinConstants) -> None:
     """Raise ValueError if a tensor of a linear molecule, whose axis is a, differs along b and c."""
-    assert top.spin_constants is not None
-    values = {parse_name(name): value for name, value in top.spin_constants.values.items()}
+    values = {parse_name(name): value for name, value in constants.values.items()}
     for parts, value in values.items():
         tensor, _, letters = parts.symbol.partition("_")
         if value and len(set(letters) - {"-"}) > 1 and set(letters) <= set("abc-"):
@@ -95,7 +93,7 @@ def _refuse_across_a_line(top: Top) -> None:
                 )
 
 
-def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
+def _refuse_weights_of_the_pair(top: Top, constants: SpinConstants, weights: SpinWeights) -> None:
     """Raise ValueError if spin weights count two nuclei that have a total spin.
 
     A geometry decides this. Without one, weights that equal those of the two nuclei are assumed to count them, unless they are stated to be
@@ -103,29 +101,26 @@ def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
     """
     from rotor.tops.spins.spin_statistics import statistical_weights
 
-    assert top.spin_constants is not None
-    twice = top.spin_constants.twice[next(iter(top.spin_constants.totals))]
+    twice = constants.twice[next(iter(constants.totals))]
     all_nuclei = None if top.molecule is None else statistical_weights(top.molecule)
     if weights.with_pair(twice) == all_nuclei:
         return
-    if weights == all_nuclei or (weights.fits_pair(twice) and not top.spin_constants.weights_of_others):
+    if weights == all_nuclei or (weights.fits_pair(twice) and not constants.weights_of_others):
         raise ValueError(
-            f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
+            f"{' and '.join(constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
             f"{(twice + 1) ** 2} functions already; give weights of the other nuclei alone: of two, 1 to levels of even total spin, "
             '0 to others; where these are those of the others, say so in a file: weights = "other nuclei" in [spins]'
         )
 
 
-def _refuse_like_nuclei(top: Top) -> None:
+def _refuse_like_nuclei(top: Top, constants: SpinConstants) -> None:
     """Raise ValueError if spin weights count the exchange of like nuclei that are coupled one by one."""
-    assert top.spin_constants is not None
     all_weights = [top.spin_weights, *(top.states.weights.values() if top.states else ())]
     all_weights = [weights for weights in all_weights if weights.rule != "none"]
-    labels = [name.partition("_")[0] for name in top.spin_constants.twice]
-    if len(top.spin_constants.totals) == 2:
-        for weights in all_weights:
-            _refuse_weights_of_the_pair(top, weights)
-        labels = [name.partition("_")[0] for name in top.spin_constants.twice if name not in top.spin_constants.totals]
+    pair = constants.totals if len(constants.totals) == 2 else ()
+    for weights in all_weights if pair else ():
+        _refuse_weights_of_the_pair(top, constants, weights)
+    labels = [name.partition("_")[0] for name in constants.twice if name not in pair]
     like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]
     if like and all_weights:
         raise ValueError(

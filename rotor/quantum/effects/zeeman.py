@@ -211,10 +211,9 @@ class ZeemanRequest:
     @property
     def spin_g(self) -> dict[str, float]:
         """g of each spin, from the request or the isotope; ValueError if it is not known."""
-        constants = self.top.spin_constants
+        constants, requested = self.top.spin_constants, dict(self.nuclear_g or {})
         if not self.hyperfine or constants is None:
-            return dict(self.nuclear_g or {})
-        requested = dict(self.nuclear_g or {})
+            return requested
         if unknown := sorted(requested.keys() - constants.twice.keys()):
             raise ValueError(f"nuclear_g: {', '.join(unknown)}: the spins of this top are {', '.join(constants.twice)}")
         return {name: _finite(name, requested[name]) if name in requested else _g_of(name) for name in constants.twice}
@@ -229,9 +228,8 @@ def _finite(name: str, value: float) -> float:
 
 def _g_of(name: str) -> float:
     """g of the isotope after which a spin is named, such as 35Cl_1."""
-    label = name.partition("_")[0]
     try:
-        g = isotope(label).g_factor
+        g = isotope(name.partition("_")[0]).g_factor
     except ValueError:
         g = None
     if g is None:

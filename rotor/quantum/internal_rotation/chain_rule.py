@@ -8,6 +8,7 @@ F, ρ and the direction of ρ of one top, and F_ij and ρ_i of several, follow f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -75,8 +76,8 @@ def kinetics_of_one_top(values: Mapping[str, float], frame: Axes) -> dict[str, f
     """F, ρ and the tilts of ρ of one top from z of a frame."""
     f, (rho,) = torsional_kinetics(values, values)
     z, x, y = frame.matrix @ rho
-    tilts = {f"{TILT}x": np.arctan2(x, z), f"{TILT}y": np.arctan2(y, z)}
-    return {"F": float(f[0, 0]), "rho": float(np.linalg.norm(rho)), **{q: float(angle) for q, angle in tilts.items()}}
+    tilts = {f"{TILT}x": math.atan2(x, z), f"{TILT}y": math.atan2(y, z)}
+    return {"F": float(f[0, 0]), "rho": float(np.linalg.norm(rho)), **tilts}
 
 
 def kinetics_of_tops(values: Mapping[str, float]) -> dict[str, float]:

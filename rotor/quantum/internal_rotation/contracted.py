@@ -27,6 +27,7 @@ from rotor.quantum.torsion import torsional_states
 
 # reduced barrier: between a torsion of 20 cm-1 (1.7) and methyl groups behind a barrier (17 and more)
 NEARLY_FREE = 5.0
+WAVES = 10  # free functions have k from -WAVES to WAVES
 
 
 class Product(NamedTuple):
@@ -96,7 +97,7 @@ class ContractedTorsion:
         return matrix
 
 
-def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, waves: int = 10) -> ContractedTorsion:
+def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, waves: int = WAVES) -> ContractedTorsion:
     """The lowest `count` torsional functions of one species for each K from -k_max to k_max.
 
     sigma: 0, or 1 for the E species of a threefold top (-1 has the same energies with K reversed). waves: the free functions are

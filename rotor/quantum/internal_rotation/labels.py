@@ -36,25 +36,21 @@ def torsional_numbers(vectors: NDArray[np.generic], t: Ints, vt_max: int) -> Int
     return numbers
 
 
-def named_by_energy(numbers: Ints, t: Ints, zeroth_order: Floats) -> Ints:
-    """The function (number in its block) that labels each state, -1 without v_t: equal ranks by energy inside v_t = t."""
+def functions_of_states(numbers: Ints, t: Ints, vectors: NDArray[np.generic], zeroth_order: Floats | None) -> Ints:
+    """The function (number in its block) that labels each state, -1 without v_t, one to one inside v_t = t.
+
+    States and functions have equal ranks by energy; without energies of zeroth order the overlaps are largest.
+    """
     names = np.full(len(numbers), -1)
     for v in np.unique(numbers[numbers >= 0]).tolist():
         states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
-        by_energy = functions[np.argsort(zeroth_order[functions], kind="stable")]
-        names[states] = by_energy[: len(states)]
-    return names
-
-
-def named_by_overlap(numbers: Ints, t: Ints, vectors: NDArray[np.generic]) -> Ints:
-    """The function (number in its block) that labels each state, -1 without v_t: largest overlap, one to one inside v_t = t."""
-    names = np.full(len(numbers), -1)
-    for v in np.unique(numbers[numbers >= 0]).tolist():
-        states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
-        overlaps = np.abs(vectors[np.ix_(functions, states)]) ** 2
-        if len(states) < len(functions):
-            overlaps = np.hstack([overlaps, np.zeros((len(functions), len(functions) - len(states)))])
-        names[states] = functions[match_names(overlaps)[: len(states)]]
+        if zeroth_order is not None:
+            order = np.argsort(zeroth_order[functions], kind="stable")
+        else:
+            overlaps = np.zeros((len(functions), len(functions)))
+            overlaps[:, : len(states)] = np.abs(vectors[np.ix_(functions, states)]) ** 2
+            order = match_names(overlaps)
+        names[states] = functions[order[: len(states)]]
     return names
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.internal_rotation.contracted import Product, Terms, Torsion, contracted_torsion
+from rotor.quantum.internal_rotation.contracted import WAVES, Product, Terms, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.frames import torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
@@ -121,7 +121,7 @@ class RamModel:
         *,
         jmin: int = 0,
         count: int = DEFAULT_COUNT,
-        waves: int = 10,
+        waves: int = WAVES,
         needed: Ints | None = None,
     ) -> SpeciesHamiltonian:
         """The blocks of one species, 0 for A and 1 for E, with J from `jmin` to `jmax` or, of these, the `needed` ones.

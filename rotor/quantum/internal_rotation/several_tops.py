@@ -20,7 +20,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.labelled import Basis, rotation_labels
-from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product, Torsion, contracted_torsion
+from rotor.quantum.internal_rotation.contracted import WAVES, ContractedTorsion, Product, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.exchange import TURNS, ExchangedTops, exchange_axis
 from rotor.quantum.internal_rotation.frames import IN_PLANE, torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
@@ -43,7 +43,7 @@ class InternalTop:
 
     f_mhz: float
     v3_mhz: float
-    rho_abc: tuple[float, float, float]
+    rho_abc: tuple[float, ...]
     v6_mhz: float = 0.0
 
     @property
@@ -139,7 +139,7 @@ class SeveralTops:
 
     def ground_energies(self, species: Species, k_max: int) -> Floats:
         """Energies (K,) of the lowest product for K from -k_max to k_max, MHz."""
-        return np.asarray(sum(top.energies[:, 0] for top in self._torsions(species, k_max, 1, 10)))
+        return np.asarray(sum(top.energies[:, 0] for top in self._torsions(species, k_max, 1, WAVES)))
 
     def _torsions(self, species: Species, k_max: int, each: int, waves: int) -> list[ContractedTorsion]:
         """Contracted functions of each top."""
@@ -156,7 +156,7 @@ class SeveralTops:
         jmin: int = 0,
         count: int | None = None,
         each: int = EACH,
-        waves: int = 10,
+        waves: int = WAVES,
         needed: Ints | None = None,
     ) -> SpeciesHamiltonian:
         """The blocks of a species, σ = 0, 1 or -1 of each top, with J from `jmin` to `jmax` or, of these, the `needed` ones.
@@ -294,18 +294,14 @@ def several_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) 
     """
     f, rho = torsional_kinetics(rotation, constants)
     tops = [
-        InternalTop(
-            float(f[i, i]), constants[f"V3_{i + 1}"], (float(rho[i, 0]), float(rho[i, 1]), float(rho[i, 2])),
-            constants.get(f"V6_{i + 1}", 0.0),
-        )
+        InternalTop(float(f[i, i]), constants[f"V3_{i + 1}"], tuple(rho[i].tolist()), constants.get(f"V6_{i + 1}", 0.0))
         for i in range(len(f))
-    ]  # fmt: skip
+    ]
     between = {name: value for name, value in constants.items() if name in PAIRS}
     between |= {f"F{i + 1}{j + 1}": float(f[i, j]) for i, j in combinations(range(len(f)), 2)}
     axis = _exchanging(*tops) if len(tops) == 2 else ""
     if axis:
-        turned = np.array(TURNS[axis]) * tops[0].rho_abc
-        tops[1] = replace(tops[0], rho_abc=(float(turned[0]), float(turned[1]), float(turned[2])))
+        tops[1] = replace(tops[0], rho_abc=tuple((np.array(TURNS[axis]) * tops[0].rho_abc).tolist()))
     elif len(tops) > 2:
         _refuse_exchange(tops)
     return SeveralTops(rotation, tuple(tops), between, axis)

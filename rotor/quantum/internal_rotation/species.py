@@ -20,10 +20,9 @@ from rotor.quantum.internal_rotation.expectations import Expectations
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
     counted_ka_kc,
+    functions_of_states,
     kc_of_pairs,
     kc_of_parity,
-    named_by_energy,
-    named_by_overlap,
     torsional_numbers,
 )
 from rotor.quantum.linear_stacks import LinearBlock
@@ -78,16 +77,13 @@ class SpeciesHamiltonian:
     def _solved(self, linear: FunctionBlocks, coefficients: ArrayLike, vt_max: int, by_energy: bool) -> SpeciesLevels:
         values = np.asarray(coefficients, dtype=float)
         zeroth_order, torsion = self._zeroth_order(linear, values), self.functions.torsion
-        labels = self.functions.labels["t"]
+        labels, by_overlap = self.functions.labels["t"], torsion.sigma and torsion.is_near_free
         solved = [states_of(block, values, labels[rows] <= vt_max) for rows, block in linear]
         levels, states, highest = [], [], []
         for (rows, _), (energies, vectors) in zip(linear, solved, strict=True):
             t = labels[rows]
             vt = torsional_numbers(vectors, t, vt_max)
-            if torsion.sigma and torsion.is_near_free:
-                name = named_by_overlap(vt, t, vectors)
-            else:
-                name = named_by_energy(vt, t, zeroth_order[rows])
+            name = functions_of_states(vt, t, vectors, None if by_overlap else zeroth_order[rows])
             retained = np.flatnonzero(vt >= 0)
             levels.append((energies[retained], vt[retained], rows[name[retained]]))
             states.append(vectors[:, retained])
@@ -161,15 +157,12 @@ class SpeciesLevels:
         if self.by_energy:
             k, kc = counted_ka_kc(j, v, self.energies)
         elif self.functions.has_parity:
-            kc = kc_of_parity(j, k, self._parity(name, v) * np.where((k % 2 == 1) & (self.source.normal == "b"), -1, 1))
+            # (-1)^(J + Kc), of the axis b (-1)^(J + Ka + Kc)
+            s = labels["s"][name] * (self.functions.torsion.parity[v] if self.functions.folded else 1)
+            kc = kc_of_parity(j, k, s * np.where((k % 2 == 1) & (self.source.normal == "b"), -1, 1))
         else:
             kc = kc_of_pairs({"J": j, "vt": v}, k, self.energies)
         return {"j": j, "vt": v, "k": k, "ka": np.abs(k), "kc": kc}
-
-    def _parity(self, name: Ints, v: Ints) -> Ints:
-        """(-1)^(J + Kc) of the levels that these functions label."""
-        s = self.functions.labels["s"][name]
-        return np.asarray(s * self.functions.torsion.parity[v] if self.functions.folded else s)
 
     def slopes(self, levels: Ints | None = None, further: Sequence[Sequence[Product]] = ()) -> Floats:
         """⟨ψ|O|ψ⟩ (levels, operators) of some levels, by default of all: ∂E/∂c of the terms, then those of further operators."""

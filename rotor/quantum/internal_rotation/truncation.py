@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor.quantum.internal_rotation.contracted import WAVES
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.several_tops import EACH, SeveralTops
 
@@ -14,7 +15,7 @@ MARGIN = 1.5  # factor on the change from n_v to n_v + 4 functions: the error fa
 ROUNDING = 64 * float(np.finfo(float).eps)  # round-off relative to the largest energy in a block
 
 
-def truncation_mhz(model: RamModel | SeveralTops, jmax: int, vt_max: int, count: int, waves: int = 10) -> float:
+def truncation_mhz(model: RamModel | SeveralTops, jmax: int, vt_max: int, count: int) -> float:
     """Bound (MHz) of the truncation error of levels with v_t ≤ vt_max at J = jmax, where it is largest.
 
     Energies are upper bounds and fall with n_v. The bound is 1.5 times their change from n_v to n_v + 4 functions (2 n_v products for
@@ -26,12 +27,12 @@ def truncation_mhz(model: RamModel | SeveralTops, jmax: int, vt_max: int, count:
     """
     largest, scale = 0.0, 0.0
     products = EACH ** len(model.tops) if isinstance(model, SeveralTops) else 0
-    enlarged = min(2 * count, products) if products else min(count + STEP, 2 * waves + 1)
+    enlarged = min(2 * count, products) if products else min(count + STEP, 2 * WAVES + 1)
     for species in model.species.values():
         energies = []
         for functions in (count, enlarged):
             solve: Any = model.blocks  # takes σ, or σ of each top
-            blocks = solve(species, jmax, jmin=jmax, count=functions, waves=waves)
+            blocks = solve(species, jmax, jmin=jmax, count=functions)
             levels = blocks.solve_once(model.coefficients, vt_max)
             order = np.lexsort([levels.quanta[name] for name in ("kc", "ka", "vt")])
             energies.append(levels.energies[order])
