@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Model:
-    """What a coupled calculation consists of: operators of every state by v, couplings with their values in MHz by states, limits of K."""
+    """What a coupled calculation consists of: operators of every state by v, sums of couplings times their values in MHz, limits of K."""
 
     states: dict[int, Operators]
-    couplings: dict[tuple[int, int], list[tuple[float, Coupling]]]
+    links: list[Link]
     representation: str
     limits: dict[int, tuple[int, int]] = field(default_factory=dict)
 
@@ -45,20 +45,23 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
 
     Raises ValueError for a coupling to a state that no effect defines, and for two effects that define the same state.
     """
-    states, couplings = {0: operators}, dict[tuple[int, int], list[tuple[float, Coupling]]]()
+    states, alike = {0: operators}, dict[object, list[tuple[float, Coupling]]]()
     for effect in effects:
         values = effect.parameters(top)
         for coupling in couplings_of(top, [effect], representation):
-            couplings.setdefault((coupling.bra, coupling.ket), []).append((values[coupling.name], coupling))
+            key = coupling.bra, coupling.ket, coupling.factors
+            alike.setdefault(key, []).append((values[coupling.name], coupling))
         states |= {state.v: state.operators(values) for state in effect.states(top)}
     numbers = [0, *(state.v for effect in effects for state in effect.states(top))]
     if len(set(numbers)) < len(numbers):
         raise ValueError(f"states {numbers}: every state has a number v of its own, and 0 is the top's")
-    for pair, linked in couplings.items():
-        for v in pair:
+    links = [Link.from_couplings(couplings) for couplings in alike.values()]
+    for link in links:
+        for v in (link.bra, link.ket):
             if v not in states:
-                raise ValueError(f"coupling {linked[0][1].name}: state {v} is not defined; known are {sorted(states)}")
-    return Model(states, couplings, representation, k_limits_of(top, effects))
+                name = link.couplings[0].name
+                raise ValueError(f"coupling {name}: state {v} is not defined; known are {sorted(states)}")
+    return Model(states, links, representation, k_limits_of(top, effects))
 
 
 def coupled_levels(
@@ -109,8 +112,7 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
         j: [(v, b) for v in sorted(model.states) for b in blocks_within(j, frame, limits.get(v))] for j in all_j
     }
     operators = [(v, 0, operators) for v, operators in model.states.items()]
-    links = [(0, Link.from_couplings(couplings)) for couplings in _alike(model)]
-    terms = StateTerms.from_operators(model.states, operators, links)
+    terms = StateTerms.from_operators(model.states, operators, [(0, link) for link in model.links])
     elements = StateElements(terms, 1, vertices)
     by_j: dict[int, list[SolvedBlock]] = {}
     for j in sorted(all_j, reverse=True):
@@ -130,15 +132,6 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
             labels, mixing = names_of_states(parts, matrix, vectors, model.representation)
             by_j[j].append(SolvedBlock(parts, energies + zero, vectors, labels=labels, mixing=mixing))
     return [block for j in all_j for block in by_j[j]]
-
-
-def _alike(model: Model) -> list[list[tuple[float, Coupling]]]:
-    """The couplings with their values, those of the same states and factors together, whose sum is one operator."""
-    alike: dict[object, list[tuple[float, Coupling]]] = {}
-    for states, couplings in model.couplings.items():
-        for value, coupling in couplings:
-            alike.setdefault((states, coupling.factors), []).append((value, coupling))
-    return list(alike.values())
 
 
 def names_of_states(

@@ -31,9 +31,8 @@ class Elements:
         matrix[self.rows, self.columns] = self.values[operator]
         return matrix
 
-    def between(self, functions: NDArray[np.bool_]) -> Elements:
-        """The elements between chosen functions (count,)."""
-        here = functions[self.rows] & functions[self.columns]
+    def where(self, here: NDArray[np.bool_]) -> Elements:
+        """Some of the elements."""
         return Elements(self.count, self.rows[here], self.columns[here], self.values[:, here])
 
 

@@ -125,8 +125,7 @@ class ExchangedTops(TorsionRotation):
     def symmetry_allowed(self, elements: Elements) -> Elements:
         """Elements of the full Hamiltonian without the round-off between functions of different x."""
         x = self.labels["x"]
-        here = x[elements.rows] == x[elements.columns]
-        return Elements(elements.count, elements.rows[here], elements.columns[here], elements.values[:, here])
+        return elements.where(x[elements.rows] == x[elements.columns])
 
 
 def _pairs(rows: Ints, others: Ints, first: Floats, factor: Floats | None = None) -> Any:

@@ -118,7 +118,7 @@ class TorsionRotation:
         if rank or self.folded:
             j = self.rotation.labels["J"]
             lower = j[plain.rows] >= j[plain.columns]
-        return Elements(plain.count, plain.rows[lower], plain.columns[lower], plain.values[:, lower])
+        return plain.where(lower)
 
     def symmetry_allowed(self, elements: Elements) -> Elements:
         """Elements of the full Hamiltonian without those that symmetry excludes."""

@@ -70,7 +70,7 @@ class SpeciesHamiltonian:
         if below_mhz < math.inf:
             value = np.where(elements.rows == elements.columns, elements.values[0].real, -np.abs(elements.values[0]))
             low = np.bincount(elements.rows, value, elements.count) <= below_mhz
-            elements = elements.between(low)
+            elements = elements.where(low[elements.rows] & low[elements.columns])
             needed = low if needed is None else low & needed
         return connected_blocks(self.functions.labels, elements, needed)
 

@@ -71,7 +71,7 @@ def solve_rotation(
         model = model_of(top, effects, operators, representation)
         if _axial_states(top, model) and not in_blocks:
             return _symmetric(top, effects, model.states, jmin, jmax)
-        if len(model.states) > 1 or model.couplings:
+        if len(model.states) > 1 or model.links:
             return coupled_levels(top, effects, model, jmin, jmax, executor)
         if top.kind == "asymmetric" or in_blocks or limits or not _closed_form_holds(top.kind, operators):
             return _in_wang_blocks(top, effects, operators, jmin, jmax, vectors, executor, limits.get(0), below_mhz)
@@ -145,7 +145,7 @@ def _symmetric(
 
 def _axial_states(top: Top, model: Model) -> bool:
     """Whether several states of a symmetric top have closed forms: they are uncoupled, and K is good in each."""
-    alone = len(model.states) > 1 and not model.couplings and not model.limits
+    alone = len(model.states) > 1 and not model.links and not model.limits
     return top.kind in ("prolate", "oblate") and alone and all(n == 0 for o in model.states.values() for _, _, n in o)
 
 
