@@ -77,10 +77,8 @@ class FourierSeries:
 
     def derivative(self, angles: ArrayLike, order: int = 1) -> Floats:
         """The first or second derivative at angles in radians."""
-        phases, n = np.multiply.outer(np.asarray(angles, dtype=float), self.n), self.n
-        if order == 1:
-            return np.asarray(np.cos(phases) @ (n * self.sines) - np.sin(phases) @ (n * self.cosines))
-        return np.asarray(-np.cos(phases) @ (n**2 * self.cosines) - np.sin(phases) @ (n**2 * self.sines))
+        phases = np.multiply.outer(np.asarray(angles, dtype=float), self.n)
+        return np.asarray((np.exp(1j * phases) @ ((1j * self.n) ** order * (self.cosines - 1j * self.sines))).real)
 
     def extrema(self, sign: float = 1.0) -> Floats:
         """Angles of the minima in a turn, of the maxima with sign -1; refined by Newton's steps."""

@@ -105,12 +105,8 @@ def saved_of_each(effects: Sequence[Iterable[QuantumEffect]], request: Any) -> H
     """What asks for the effects of several molecules again."""
     from rotor.tops.top import Top
 
-    pairs = [
-        (each, molecule)
-        for each, molecule in zip(effects, request.molecules, strict=False)
-        if isinstance(molecule, Top)
-    ]
-    saved = [saved_of_top(each, top) for each, top in pairs]
+    pairs = zip(effects, request.molecules, strict=False)
+    saved = [saved_of_top(each, molecule) for each, molecule in pairs if isinstance(molecule, Top)]
     return next((saved_input for saved_input in saved if saved_input.hyperfine is not None), HamiltonianInput())
 
 

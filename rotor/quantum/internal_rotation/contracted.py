@@ -103,7 +103,7 @@ def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, wav
     sigma: 0, or 1 for the E species of a threefold top (-1 has the same energies with K reversed). waves: the free functions are
     exp i(3k + σ)α with k from -waves to waves.
     """
-    waves_k, shifts = np.arange(-waves, waves + 1), torsion.rho * np.arange(-k_max, k_max + 1)
+    waves_k, shifts = np.arange(-waves, waves + 1), torsion.rho * np.arange(-k_max, k_max + 1, dtype=float)
     if count > len(waves_k):
         raise ValueError(f"n_v = {count}: expected at most {len(waves_k)}, the number of free-rotor functions")
     energies, vectors = torsional_states(torsion.f_mhz, torsion.barriers, shifts, sigma, waves)

@@ -188,8 +188,12 @@ def energies_alone(
             solved = [block.energies(unit) for _, block in linear]
         else:
             populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
-            if populated > MOST_POPULATED:
-                _refuse_long_sums((2 * jmax + 1) * constants.functions)
+            size = (2 * jmax + 1) * constants.functions
+            if populated > MOST_POPULATED and size > MOST_SUMMED:  # blocks that take minutes
+                raise ValueError(
+                    f"internal rotation of three tops: sums over levels at this temperature need many states of blocks of {size} "
+                    "functions; give the partition function (--q), a lower temperature, or fewer functions"
+                )
             solved = [states_of(block, unit, labels["t"][rows] < populated)[0] for rows, block in linear]
         energies += solved
         rows = np.concatenate([of_block[: len(e)] for (of_block, _), e in zip(linear, solved, strict=True)])
@@ -199,15 +203,6 @@ def energies_alone(
         columns = degeneracies.columns(name, blocks.functions, rows)
         pieces.append(columns | {"vt": labels["t"], "j": j, "ka": ka, "kc": kc})
     return joined_levels(top, effects, jmax, pieces, np.concatenate(energies))
-
-
-def _refuse_long_sums(size: int) -> None:
-    """ValueError for blocks of three tops that take minutes where more than two torsional states are populated."""
-    if size > MOST_SUMMED:
-        raise ValueError(
-            f"internal rotation of three tops: sums over levels at this temperature need many states of blocks of {size} functions; "
-            "give the partition function (--q), a lower temperature, or fewer functions"
-        )
 
 
 def joined_levels(

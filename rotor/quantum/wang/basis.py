@@ -69,16 +69,11 @@ def parts_of(members: Iterable[tuple[int, WangBlock]]) -> tuple[Part, ...]:
     return tuple(parts)
 
 
-def _parity(character: int) -> str:
-    """e or o."""
-    return "e" if character > 0 else "o"
-
-
 def _species(j: int, first_k: int, sign: int, axes: str) -> str:
     """Parities of Ka and Kc of a Wang block."""
     k_even, j_even = (-1) ** first_k, (-1) ** j
     character = {axes[0]: sign * j_even, axes[1]: sign * j_even * k_even, axes[2]: k_even}
-    return _parity(character["a"]) + _parity(character["c"])
+    return "".join("e" if character[axis] > 0 else "o" for axis in "ac")
 
 
 def character(species: str, axis: str) -> int:
