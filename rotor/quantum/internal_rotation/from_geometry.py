@@ -75,7 +75,10 @@ def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") ->
     texts += [f"{', '.join(names)} = {origin}" for origin, names in origins.items()]
     texts += ["coupling of the potentials (V12) left out"] if numbers[0] and not PAIRS.keys() & values else []
     source = "; ".join(texts)
-    nuclei = {"spin_states": _spin_states(top, groups), "exchanged": _exchanged_pairs(top, groups, exchange)}
+    nuclei: dict[str, Any] = {
+        "spin_states": _spin_states(top, groups),
+        "exchanged": _exchanged_pairs(top, groups, exchange),
+    }
     uncertain = {name: error for name, error in errors.items() if name not in values}
     internal = InternalRotationConstants(
         constants | values, "PAM", uncertainties=uncertain, source=source, **(nuclei | settings)
