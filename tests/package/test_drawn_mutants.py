@@ -88,7 +88,7 @@ def test_a_solver_that_does_not_converge_raises(monkeypatch):
     unfinished = (np.zeros(size), np.eye(size), 3)
     monkeypatch.setattr(scipy.linalg.lapack, "dstevd", lambda *_, **__: unfinished)
     with pytest.raises(ValueError, match=rf"did not converge on a block of size {size} \(info = 3\)"):
-        wang_matrix.diagonalise([np.arange(size) ** 2.0, np.ones(size - 1)])
+        wang_matrix.diagonalise_all([[np.arange(size) ** 2.0, np.ones(size - 1)]])
 
 
 def test_a_data_frame_whose_library_lacks_a_part_says_which(monkeypatch):

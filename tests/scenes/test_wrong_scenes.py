@@ -83,7 +83,7 @@ def test_a_point_of_a_sweep_that_cannot_be_costs_itself(call, folder):
 
 OPTIONS = [
     (["stark", "OCS", "--field", "1kV/cm", "--m", "7"], "--m: [7]"),
-    (["stark", "OCS", "--field", "1kV/cm", "--states", "101"], "--states: states up to J = 101"),
+    (["stark", "OCS", "--field", "1kV/cm", "--states", "101"], "--states: 101: expected a whole number from 0 to 100"),
     (
         ["stark", "OCS", "--field", "1kV/cm", "--intensity", "-1 W/cm2"],
         "--intensity: -1 W/cm2: expected a number from 0",

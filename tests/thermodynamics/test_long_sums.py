@@ -12,7 +12,7 @@ from rotor.cli import declaration
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.rotation import hamiltonian
-from rotor.quantum.wang.wang_matrix import block_bands, diagonalise, lowest_energies
+from rotor.quantum.wang.wang_matrix import block_bands, diagonalise_all, lowest_energies
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.thermodynamics.sums.classical_onset import classical_above_k
 from rotor.thermodynamics.sums.level_sums import level_sums
@@ -39,7 +39,7 @@ def one_block(constants: str, j: int) -> list[np.ndarray]:
 def test_energies_up_to_a_bound_are_those_of_the_whole_block(constants, monkeypatch):
     monkeypatch.setattr(wang_matrix, "SMALL", 10)
     bands = one_block(constants, 120)
-    whole = diagonalise(bands, vectors=False)[0]
+    whole = diagonalise_all([bands], vectors=False)[0][0]
     for place in (0, 1, 3, 40):
         below = 0.5 * (whole[place] + whole[place + 1])
         computed = lowest_energies(bands, below)

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
-from rotor.checks import require_positive
+from rotor.checks import require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 HIGHEST_KV_PER_CM = 1e5  # 1 V/Å is 1e5 kV/cm: molecules are ionised
 DEFAULT_TOLERANCE_MHZ = 1e-6
+HIGHEST_J = 100  # of free levels in a map
 ELECTRIC = FieldKind(
     "kV/cm", "fields_kv_per_cm", "field_kv_per_cm", "mu_eff_debye", units.MHZ_PER_DEBYE_KV_PER_CM, HIGHEST_KV_PER_CM
 )
@@ -133,13 +134,6 @@ def checked_direction(direction: Sequence[float]) -> tuple[float, float, float]:
         )
     x, y, z = (vector / length).tolist()
     return x, y, z
-
-
-def checked_j(j_highest: int) -> int:
-    """J from 0 to 100; ValueError for others."""
-    if not 0 <= j_highest <= 100:
-        raise ValueError(f"j_highest: states up to J = {j_highest}: expected a whole number from 0 to 100")
-    return int(j_highest)
 
 
 def acting(
@@ -232,7 +226,7 @@ class StarkRequest:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        checked_j(self.j_highest)
+        require_whole("j_highest", self.j_highest, 0, HIGHEST_J)
         projections(self.top, self.effects, self.m_values, self.j_highest)
         require_positive("most_at_edge", self.most_at_edge)
         checked_direction(self.direction)

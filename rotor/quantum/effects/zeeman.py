@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
+from rotor.checks import require_whole
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.effects.stark import DEFAULT_TOLERANCE_MHZ, Z, checked_j, projections
+from rotor.quantum.effects.stark import DEFAULT_TOLERANCE_MHZ, HIGHEST_J, Z, projections
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.fields.answer import MapAnswer
 from rotor.quantum.fields.blocks import Contraction, Magnet
@@ -166,7 +167,7 @@ class ZeemanRequest:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        checked_j(self.j_highest)
+        require_whole("j_highest", self.j_highest, 0, HIGHEST_J)
         MAGNETIC.checked(self.fields_tesla)
         checked_g(self.top, self.magnetic.g)
         if self.nuclear_g and not (self.hyperfine or self.hamiltonian):

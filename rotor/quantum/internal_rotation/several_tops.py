@@ -258,18 +258,18 @@ class SeveralTops:
     @property
     def coefficients(self) -> Floats:
         """The values of the coefficients, MHz."""
-        each = [value for top in self.tops for value in (top.f_mhz, top.v3_mhz, top.v6_mhz)]
-        pairs = [
-            self.between.get(name.format(i + 1, j + 1), 0.0)
-            for i, j in self._pairs
-            for name in ("F{}{}", "V{}{}", "V{}{}s")
-        ]
-        return np.array([*self.rotation.values(), *each, *pairs])
+        return np.array([*self.values.values()])
 
     @property
     def values(self) -> dict[str, float]:
-        """The coefficients by name."""
-        return dict(zip(self.terms((0,) * len(self.tops)), self.coefficients.tolist(), strict=True))
+        """The coefficients by name, in the order of `terms`."""
+        values = dict(self.rotation)
+        for i, top in enumerate(self.tops, 1):
+            values |= {f"F{i}": top.f_mhz, f"V3_{i}": top.v3_mhz, f"V6_{i}": top.v6_mhz}
+        for i, j in self._pairs:
+            pair = f"{i + 1}{j + 1}"
+            values |= {name: self.between.get(name, 0.0) for name in (f"F{pair}", f"V{pair}", f"V{pair}s")}
+        return values
 
     @property
     def jacobian(self) -> Floats:

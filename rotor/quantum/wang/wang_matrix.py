@@ -125,11 +125,6 @@ def block_bands(operators: Operators, blocks: Sequence[WangBlock]) -> Iterator[l
             yield [diagonal[number, : block.size - n] for n, diagonal in enumerate(diagonals[: block.size])]
 
 
-def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
-    """`diagonalise_all` for one matrix."""
-    return diagonalise_all([bands], vectors)[0]
-
-
 def diagonalise_all(matrices: Sequence[list[Floats]], vectors: bool = True) -> list[tuple[Floats, Floats]]:
     """Eigenvalues (rising) and eigenvectors (columns) of symmetric matrices from their diagonals.
 
@@ -190,13 +185,13 @@ def _tridiagonal(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
 
 
 def lowest_energies(bands: list[Floats], below: float) -> Floats:
-    """Eigenvalues up to `below`, rising, and higher ones where computing all takes no longer. Raises as `diagonalise` does.
+    """Eigenvalues up to `below`, rising, and higher ones where computing all takes no longer. Raises as `diagonalise_all` does.
 
     A few eigenvalues of a large tridiagonal matrix are computed by bisection (LAPACK's dstebz).
     """
     size = len(bands[0])
     if size <= SMALL or len(bands) != 2:
-        return diagonalise(bands, vectors=False)[0]
+        return diagonalise_all([bands], vectors=False)[0][0]
     _refuse_infinite(*bands)
     from scipy.linalg.lapack import dstebz
 
@@ -206,7 +201,7 @@ def lowest_energies(bands: list[Floats], below: float) -> Floats:
         return np.zeros(0)
     rough, *_ = dstebz(bands[0], bands[1], 1, lowest, below, 1, size, below - lowest, b"E")  # their number, at once
     if rough * FEW > size:
-        return diagonalise(bands, vectors=False)[0]
+        return diagonalise_all([bands], vectors=False)[0][0]
     count, energies, _, _, info = dstebz(bands[0], bands[1], 1, lowest, below, 1, size, 0.0, b"E")
     if info:
         raise ValueError(f"LAPACK dstebz did not converge on a block of size {size} (info = {info})")

@@ -318,7 +318,7 @@ def test_two_crossings_between_two_fields_are_seen():
         ({"fields_kv_per_cm": [0.0, 1.0, -1e7]}, "a field of -1e\\+07 kV/cm is beyond"),
         ({"fields_kv_per_cm": [np.nan]}, "finite"),
         ({"fields_kv_per_cm": []}, "finite"),
-        ({"j_highest": -1}, "J = -1"),
+        ({"j_highest": -1}, "j_highest: -1: expected a whole number"),
         ({"m_values": (3,)}, "m_values: "),
         ({"intensity_w_per_cm2": -1.0}, "intensity_w_per_cm2: -1"),
         ({"intensity_w_per_cm2": 1e10}, "polarizability"),
