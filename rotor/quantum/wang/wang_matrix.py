@@ -47,11 +47,16 @@ def order_of(operators: Iterable[Powers]) -> int:
 
 def elements_by_order(operators: Operators, js: Sequence[int]) -> list[Floats]:
     """⟨K+2n|H|K⟩ by n, (J, K) for K from -2 `order_of` to the highest J; zero for n > 0 and K + 2n beyond J."""
-    order, highest = order_of(operators), max(js)
-    k, j = np.arange(-2 * order, highest + 2 * order + 1), np.array(js)[:, None]
-    steps = np.sqrt(np.maximum((j - k) * (j + k + 1), 0))  # elements of J₊ over |J K⟩; zero beyond K = J
+    order = order_of(operators)
+    k, steps = _steps(js, order)
     with np.errstate(over="ignore", invalid="ignore"):  # reported where the block is diagonalised
-        return [_elements_of_order(operators, js, k[: len(k) - 2 * order], n, steps) for n in range(order + 1)]
+        return [_elements_of_order(operators, js, k, n, steps) for n in range(order + 1)]
+
+
+def _steps(js: Sequence[int], order: int) -> tuple[Ints, Floats]:
+    """K from -2 `order` to the highest J, and elements of J₊ over |J K⟩ (J, K) up to K + 2 `order`, zero beyond K = J."""
+    k, j = np.arange(-2 * order, max(js) + 2 * order + 1), np.array(js)[:, None]
+    return k[: len(k) - 2 * order], np.sqrt(np.maximum((j - k) * (j + k + 1), 0))
 
 
 def _elements_of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: Floats) -> Floats:
@@ -216,8 +221,10 @@ def unit_diagonals(
     taken: how many of the states of each block.
     """
     js, rows = WangRows.from_blocks(blocks, taken)
-    out = tuple(np.zeros((*rows.k.shape, len(units))) for _ in range(order_of((0, q, n) for q, n in units) + 1))
+    order = order_of((0, q, n) for q, n in units)
+    k, steps = _steps(js, order)
+    out = tuple(np.zeros((*rows.k.shape, len(units))) for _ in range(order + 1))
     for place, (q, n) in enumerate(units):
-        elements = elements_by_order({(0, q, n): 1.0}, js)[-1]
-        rows.add(elements, n, n, [diagonal[:, :, place] for diagonal in out])
+        elements = _elements_of_order({(0, q, n): 1.0}, js, k, n, steps)
+        rows.add(elements, n, order, [diagonal[:, :, place] for diagonal in out])
     return out

@@ -142,7 +142,7 @@ def test_a_spin_alone_precesses_beside_a_linear_top():
     ("call", "message"),
     [
         (lambda top, q: stark_map(top, [1.0], effects=q, direction=(1, 0, 1)), "along Z alone"),
-        (lambda top, q: stark_map(top, [1.0], effects=q, m_values=(0.5,)), "M_F of"),
+        (lambda top, q: stark_map(top, [1.0], effects=q, m_values=(0.5,)), "m_values: "),
         (lambda top, q: zeeman_map(top, [1.0], 0.1, nuclear_g={"N": 0.4}), "give the effects"),
         (lambda top, q: zeeman_map(top, [1.0], 0.1, effects=q, nuclear_g={"H": 5.6}), "g of H"),
         (lambda top, q: zeeman_map(top, [1.0], 0.1, magnetisability=np.nan), "χ tensor"),
