@@ -31,7 +31,7 @@ class Numbers(Listed):
         else:
             values = tuple(map(float, [raw] if isinstance(raw, Real) else raw))
         if (self.counts and len(values) not in self.counts) or not values or not all(map(math.isfinite, values)):
-            words = {1: "one", 3: "three"}
+            words = {1: "one", 3: "three", 4: "four"}
             count = " or ".join(words.get(n, str(n)) for n in self.counts)
             raise ValueError(f"{raw!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}")
         return values

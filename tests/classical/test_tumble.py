@@ -232,7 +232,7 @@ MISTAKES = [
     (("water", "--moments", "1,2,3"), "a molecule and --moments"),
     ((), "try 'rotor tumble water'"),
     (("--moments", "-1,1,1", "--angular-momentum", "1,1,1"), "--moments: '-1,1,1': principal moments must be finite"),
-    (("--moments", "1,1", "--angular-momentum", "1,1,1"), "--moments: '1,1': expected three numbers"),
+    (("--moments", "1,1", "--angular-momentum", "1,1,1"), "--moments: '1,1': expected three finite numbers"),
     (("--moments", "0,0,1", "--angular-momentum", "0,1,1"), "two moments are zero"),
     (("--moments", "1,2,x", "--angular-momentum", "1,1,1"), "'x' is not a number"),
     (("--moments", "1,2,3 kg", "--angular-momentum", "1,1,1"), "unit 'kg' does not measure the same thing as 'kg*m2'"),
@@ -439,6 +439,6 @@ def test_a_driven_motion_names_its_method_in_words(call):
 def test_a_velocity_beyond_doubles_is_refused_by_its_option(call):
     code, out, err = call("tumble", "water", "--omega", "1e400,1,1")
     assert (code, out) == (2, "")
-    assert err == "error: --omega: '1e400,1,1': an angular velocity holds a number that is not finite\n"
-    with pytest.raises(ValueError, match=r"^angular_velocity: \[1, 2\]: expected three numbers"):
+    assert err == "error: --omega: '1e400,1,1': expected three finite numbers, such as 0.6,0.8,1.0\n"
+    with pytest.raises(ValueError, match=r"^angular_velocity: \[1, 2\]: expected three finite numbers"):
         rotor.tumble("water", angular_velocity=[1, 2])

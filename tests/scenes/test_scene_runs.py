@@ -205,7 +205,7 @@ BAD = [
     (make_scene("levels", molecule="water", observables={"jmax": -1}), "observables.jmax: -1"),
     (make_scene("levels", molecule="nonesuch"), "molecule.source: 'nonesuch' is no file here"),
     (make_scene("tumble"), "molecule, body: give one of them"),
-    (make_scene("tumble", body={"moments": [1, 2], "angular_velocity": [1, 2, 3]}), "expected three numbers"),
+    (make_scene("tumble", body={"moments": [1, 2], "angular_velocity": [1, 2, 3]}), "expected three finite numbers"),
     (make_scene("fluid", conditions={}), "conditions: give either molecules"),
     (make_scene("align", molecule="OCS", pulses=[{"shape": "gaussian", "peak": "1 T", "fwhm": 1}]), "pulses[0].peak: '1 T'"),
     (make_scene("align", molecule="OCS", pulses=[{"shape": "gaussian", "peak": 1e10, "fwhm": 1, "axis": "up"}]), "pulses[0].axis: 'up'"),

@@ -15,7 +15,7 @@ import numpy as np
 from rotor.checks import no_molecule
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
-from rotor.requests.fill import Entries, naming, read_instance, within
+from rotor.requests.fill import Entries, naming, within
 from rotor.requests.lists import Numbers, Pairs
 from rotor.requests.readers import Names, Quantity, Text
 
@@ -27,6 +27,7 @@ USUAL_LEAST_MHZ = 100.0  # largest constant below which a missing unit gives a n
 STATES = ("state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names")
 DIPOLE, POLARIZABILITY = ("dipole", "dipole_abc"), ("polarizability", "anisotropy")
 NUCLEI, REFINEMENT = ("spin_constants", "spins"), ("calculator", "hessian")
+AXIAL = ("linear", "prolate", "oblate")  # kinds of top with one axis
 _GEOMETRY = {
     "isotopes": "bare constants have no atoms; give the constants of the isotopologue itself",
     "calculator": "bare constants have no geometry to refine; give a molecule",
@@ -176,12 +177,6 @@ def is_file(name: str) -> bool:
         return False
 
 
-def read_molecule(entries: Entries) -> MoleculeInput:
-    """The inputs of a molecule."""
-    inputs: MoleculeInput = read_instance(MoleculeInput, entries)
-    return inputs
-
-
 def top_of(reading: Reading) -> Top:
     """The top that the inputs describe.
 
@@ -325,29 +320,26 @@ def _with_dipole_of_input(top: Top, dipole: tuple[float, ...], reading: Reading)
 
 def _with_polarizability(top: Top, numbers: tuple[float, ...], reading: Reading) -> Top:
     """The top with a polarizability (Å³): 2 numbers along and across the axis, 3 on the diagonal, or 6 with ab, ac, bc."""
-    text = ",".join(f"{x:g}" for x in numbers)
-    if len(numbers) == 2 and top.kind in ("linear", "prolate", "oblate"):
-        along, across = numbers
-        numbers = (across, across, along) if top.kind == "oblate" else (along, across, across)
-    if len(numbers) not in (3, 6):
+    from rotor.tops.magnetic import tensor_for
+
+    if len(numbers) not in (3, 6) and not (len(numbers) == 2 and top.kind in AXIAL):
+        text = ",".join(f"{x:g}" for x in numbers)
         raise ValueError(
             f"{text!r}: expected aa,bb,cc or aa,bb,cc,ab,ac,bc, or parallel,perpendicular for a linear or symmetric top"
         )
-    aa, bb, cc, ab, ac, bc = [*numbers, 0.0, 0.0, 0.0][:6]
     source = reading.source("polarizability", " in principal axes")
-    return top.with_polarizability([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]], source)
+    return top.with_polarizability(tensor_for(top.kind, numbers), source)
 
 
 def _with_anisotropy(top: Top, anisotropy: float, reading: Reading) -> Top:
-    if top.kind not in ("linear", "prolate", "oblate"):
+    from rotor.tops.magnetic import tensor_for
+
+    if top.kind not in AXIAL:
         raise ValueError(
             f"a top of the kind {top.kind} has no single anisotropy; give {reading.named('polarizability')} aa,bb,cc"
         )
-    tensor = np.zeros((3, 3))
-    axis = 2 if top.kind == "oblate" else 0
-    tensor[axis, axis] = anisotropy
     how = f"the anisotropy {reading.source('anisotropy')}; the mean, which exerts no torque, is left out"
-    return top.with_polarizability(tensor, how)
+    return top.with_polarizability(tensor_for(top.kind, (anisotropy, 0.0)), how)
 
 
 def _with_spins(top: Top, text: str, reading: Reading) -> Top:

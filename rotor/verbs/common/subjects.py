@@ -12,7 +12,7 @@ from rotor.frozen import dataclass
 from rotor.requests.field import REQUIRED, all_fields
 from rotor.requests.fill import Entries, read_instance, written_fields
 from rotor.requests.readers import Custom, Field
-from rotor.verbs.common.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
+from rotor.verbs.common.molecule import FIELDS, MoleculeInput, Reading, top_of
 from rotor.verbs.common.verb import Note, Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class OneMolecule(SubjectKind):
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the molecule and prepare its top."""
-        molecule = read_molecule(entries)
+        molecule: MoleculeInput = read_instance(MoleculeInput, entries)
         reading = Reading(molecule, entries.style, place.folder, place.note)
         top = self.prepare(top_of(reading), reading, entries)
         text = str(molecule.source or molecule.constants or "")
@@ -91,7 +91,7 @@ def top_of_word(
 ) -> Top:
     """The top of a source on the command line. note: takes remarks."""
     values = {"molecule.source": source, "molecule.isotopes": tuple(isotopes) or None}
-    reading = Reading(read_molecule(Entries(values, "option")), "option", ".", note)
+    reading = Reading(read_instance(MoleculeInput, Entries(values, "option")), "option", ".", note)
     return prepare(top_of(reading), reading)
 
 

@@ -15,9 +15,10 @@ from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE as MOLECULE_PANEL
 from rotor.requests.field import NUMERICS, all_fields, declared
-from rotor.requests.fill import Entries, NamedError, naming, read_instance, written_fields
+from rotor.requests.fill import Entries, NamedError, naming, read_instance, within, written_fields
+from rotor.requests.lists import Numbers
 from rotor.requests.readers import Custom, Field, Grid, Quantity, Reader, Whole
-from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL, parse_grid
+from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 from rotor.verbs.common.subjects import MOLECULE, OneMolecule, saved_molecule
 from rotor.verbs.common.verb import Place, Subject, Verb
 
@@ -32,33 +33,16 @@ _UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
 
 def three(raw: Any, unit: str = "") -> Three:
     """Three finite numbers; a text may carry a unit, else `unit` holds."""
-    x, y, z = _numbers(raw, 3, "three numbers, such as 0.6,0.8,1.0", unit)
+    x, y, z = Numbers(unit, (3,), "0.6,0.8,1.0").read(raw)
     return x, y, z
-
-
-def _four(raw: Any) -> tuple[float, float, float, float]:
-    w, x, y, z = _numbers(raw, 4, "four numbers, such as 1,0,0,0")
-    return w, x, y, z
-
-
-def _numbers(raw: Any, count: int, expected: str, unit: str = "") -> list[float]:
-    if isinstance(raw, str) and (raw.count(",") != count - 1 or ":" in raw):
-        raise ValueError(f"{raw!r}: expected {expected}")
-    values = [float(number) for number in (parse_grid(raw, unit) if isinstance(raw, str) else raw)]
-    if len(values) != count:
-        raise ValueError(f"{raw!r}: expected {expected}")
-    return values
 
 
 def _moments(raw: Any) -> Three:
     from rotor.classical.euler import checked_moments
 
     moments = three(raw, "kg*m2" if in_si(raw) else "")
-    try:
+    with within(repr(raw)):
         checked_moments(moments)
-    except ValueError as error:
-        text = str(error)
-        raise ValueError(f"{raw!r}: {text}" if isinstance(raw, str) else text) from None
     return moments
 
 
@@ -119,7 +103,7 @@ class BodyInput:
         "for a molecule; also rpm, deg/s)", "body.angular_velocity", option="--omega", common=True, example=[0.1, 15.0, 0.1],
     )  # fmt: skip
     attitude: tuple[float, float, float, float] | None = declared(
-        None, Custom(_four, list, "W,X,Y,Z", list[float]), "With effects: unit quaternion, body to space, at time 0", "body.attitude",
+        None, Numbers("", (4,), "1,0,0,0", "W,X,Y,Z"), "With effects: unit quaternion, body to space, at time 0", "body.attitude",
         example=[1.0, 0.0, 0.0, 0.0],
     )  # fmt: skip
 
@@ -342,6 +326,20 @@ def _motion_of_top(entries: Entries, subject: Subject, start: BodyInput, motion:
     return replace(thermal_tumble(top, angular_momentum_hbar=chosen[0], times_ps=times), source=chosen[1])
 
 
+def _entered(
+    entries: Entries, start: BodyInput, motion: MotionInput, units: tuple[str, str]
+) -> tuple[Field, Any, Three] | None:
+    """The angular velocity or momentum at time 0: its field, as entered, and as numbers; None without. units: of both."""
+    field, value, unit = BODY["angular_velocity"], start.angular_velocity, units[0]
+    if value is None:
+        in_body = BODY if start.angular_momentum is not None else MOTION  # the key of a scene's body
+        field, value, unit = in_body["angular_momentum"], motion.angular_momentum, units[1]
+    if value is None:
+        return None
+    typed = value if isinstance(value, str) else list(value)
+    return field, typed, replace(field, reader=Custom(lambda raw: three(raw, unit))).read(typed, entries.style)
+
+
 def _start(
     entries: Entries, start: BodyInput, motion: MotionInput, moments: Any, units: tuple[str, str]
 ) -> tuple[Three, str] | None:
@@ -351,24 +349,16 @@ def _start(
     """
     from rotor.classical.euler import checked_momentum, checked_velocity
 
-    by_velocity = start.angular_velocity is not None
-    in_body = BODY if start.angular_momentum is not None else MOTION  # the key of a scene's body
-    field = BODY["angular_velocity"] if by_velocity else in_body["angular_momentum"]
-    value = start.angular_velocity if by_velocity else motion.angular_momentum
-    if value is None:
+    entered = _entered(entries, start, motion, units)
+    if entered is None:
         return None
-    text = value if isinstance(value, str) else list(value)
-    try:
-        vector = three(value, units[0] if by_velocity else units[1])
+    field, typed, vector = entered
+    called, by_velocity = field.called(entries.style), start.angular_velocity is not None
+    with within(f"{called}: {typed!r}"):
         momentum = moments * checked_velocity(vector, moments) if by_velocity else checked_momentum(vector, moments)
-    except ValueError as error:
-        message = str(error)
-        quoted = message if message.startswith(f"{text!r}") else f"{text!r}: {message}"
-        raise ValueError(f"{field.name}: {quoted}") from None
-    if not momentum.any():
-        raise ValueError(f"{field.name}: {text!r}: a body at rest does not tumble; give a component that is not 0")
-    how = "given as an angular velocity" if by_velocity else "given"
-    return three(momentum), f"{how} ({field.called(entries.style)})"
+        if not momentum.any():
+            raise ValueError("a body at rest does not tumble; give a component that is not 0")
+    return three(momentum), f"{'given as an angular velocity' if by_velocity else 'given'} ({called})"
 
 
 def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
@@ -384,25 +374,15 @@ def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: Motion
         step = replace(MOTION["step"], reader=Quantity(body.units.time, above=0)).read(motion.step, entries.style)
     if entries.has(MOTION["order"]) and step is None and entries.style != "key":
         raise NamedError("{order}: belongs to a splitting; give {step} too")
-    spin, momentum = _spin_or_momentum(entries, body, start, motion)
-    return DrivenRequest(
-        body.moments, _times(entries, motion, body.units.time) or (), motion.effects, spin, momentum,
-        start.attitude or AT_REST, motion.tolerance, step, motion.order, body.units, body.axes, body.named,
-    )  # fmt: skip
-
-
-def _spin_or_momentum(
-    entries: Entries, body: Body, start: BodyInput, motion: MotionInput
-) -> tuple[Three | None, Three | None]:
-    """Initial ω or L; a named body has the default of its free motion."""
-    if start.angular_velocity is not None:
-        reader = Custom(lambda typed: three(typed, body.units.rate))
-        return replace(BODY["angular_velocity"], reader=reader).read(start.angular_velocity, entries.style), None
-    if motion.angular_momentum is not None:
-        field = replace(MOTION["angular_momentum"], reader=Custom(three))
-        return None, field.read(motion.angular_momentum, entries.style)
-    if body.start is None:
+    entered = _entered(entries, start, motion, (body.units.rate, ""))
+    if entered is None and body.start is None:
         raise NamedError(
             "{angular_velocity}: expected with {moments}, the angular velocity at the first time; or {angular_momentum}"
         )
-    return None, body.start[0]
+    by_velocity = start.angular_velocity is not None
+    vector = entered[2] if entered is not None else body.start and body.start[0]
+    return DrivenRequest(
+        body.moments, _times(entries, motion, body.units.time) or (), motion.effects,
+        vector if by_velocity else None, None if by_velocity else vector,
+        start.attitude or AT_REST, motion.tolerance, step, motion.order, body.units, body.axes, body.named,
+    )  # fmt: skip

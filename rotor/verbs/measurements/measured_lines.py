@@ -14,7 +14,7 @@ from rotor.requests.fill import Entries, NamedError, naming, read_instance, with
 from rotor.requests.lists import NameList
 from rotor.requests.readers import Custom, Field, InsideError, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
-from rotor.verbs.common.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
+from rotor.verbs.common.molecule import FIELDS, MoleculeInput, Reading, top_of
 from rotor.verbs.common.subjects import MOLECULE, file_name, saved_inputs, saved_molecule
 from rotor.verbs.common.verb import Place, Subject, SubjectKind
 
@@ -214,7 +214,7 @@ def _instead_of_var(path: Path) -> str:
 
 def _start(entries: Entries, source: Path | None) -> MoleculeInput:
     """The molecule whose constants start the fit."""
-    molecule = read_molecule(entries) if any(entries.has(field) for field in FIELDS.values()) else MoleculeInput()
+    molecule: MoleculeInput = read_instance(MoleculeInput, entries)
     if (molecule.source is None) == (molecule.constants is None):
         if entries.style == "key" and molecule.source is None:
             raise ValueError("molecule: expected the starting constants, as source or constants")
