@@ -241,6 +241,11 @@ def weights_text(mapping: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"
 
 
+def values_text(values: Mapping[str, float]) -> str:
+    """Constants as `chi_aa -4.22, chi_bb-cc 1.1`."""
+    return ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+
+
 def q_text(partition: PartitionFunction, classical: float | None) -> str:
     """Q with its source, and its classical limit if there is one."""
     return f"{partition.q:.6g}, {partition.source}" + (f"; classical limit {classical:.6g}" if classical else "")

@@ -120,7 +120,7 @@ def _nuclei_table(answer: InfoAnswer, report: Report) -> Table:
     spins = answer.request.top.spin_constants
     records: list[dict[str, Any]] = []
     for nucleus in report.content["splitting_nuclei"]:
-        constants = _constants_text(spins.of(nucleus["nucleus"]) if nucleus["known"] and spins else {})
+        constants = top_facts.values_text(spins.of(nucleus["nucleus"]) if nucleus["known"] and spins else {})
         text = constants or "not known; the size is that of covalent bonds of this element"
         size = f"{'' if nucleus['known'] else 'about '}{nucleus['splitting_mhz']:.3g}"
         records.append({"nucleus": nucleus["nucleus"], "spin": nucleus["spin"], "size": size, "constants": text})
@@ -128,7 +128,9 @@ def _nuclei_table(answer: InfoAnswer, report: Report) -> Table:
     for name in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(values))):  # electrons, spins of 1/2, pairs
         if spins and name not in listed:
             inside = f"({name})"
-            text = _constants_text({key.replace(inside, ""): value for key, value in values.items() if inside in key})
+            text = top_facts.values_text(
+                {key.replace(inside, ""): value for key, value in values.items() if inside in key}
+            )
             spin = None if "," in name else spins.twice[name] / 2
             records.append({"nucleus": name, "spin": spin, "size": "", "constants": text})
     columns = {
@@ -138,10 +140,6 @@ def _nuclei_table(answer: InfoAnswer, report: Report) -> Table:
         "constants (MHz)": "{constants}",
     }
     return record_table("", columns, records, {"nucleus", "constants (MHz)"})
-
-
-def _constants_text(values: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {value:.6g}" for name, value in values.items())
 
 
 def _reason(source: str) -> str:
@@ -194,7 +192,7 @@ VERB = Verb(
         _facts, _constants_table, _states_table, _axes_table, _nuclei_table, _q_table, _conformers_table,
         sources=("constants", "dipole", "polarizability", "spin weights"),
     ),
-    outputs=(*tables("the table of Q(T)", "q"),),
+    outputs=tables("the table of Q(T)", "q"),
     subject=OneMolecule((*POLARIZABILITY, "internal_rotation")),
     build=lambda verb, entries, subject: InfoRequest(
         **subject.values, **read_fields(InfoRequest, entries, subject), smiles=subject.text

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
 from rotor.reports.screen import Part, Table, record_table
-from rotor.reports.top_facts import error_facts
+from rotor.reports.top_facts import error_facts, values_text
 from rotor.tops.constants.uncertain_numbers import known_digits
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
@@ -27,17 +27,11 @@ def show(answer: IsotopologuesAnswer, report: Report) -> Iterable[Part | None]:
     with_spins = [isotopologue for isotopologue in answer.family if isotopologue.top.spin_constants]
     columns = {
         "isotopologue": "{0.label}",
-        "spin constants (MHz)": lambda isotopologue: _constants_text(isotopologue.top),
+        "spin constants (MHz)": lambda isotopologue: values_text(isotopologue.top.spin_constants.values),
     }
     yield _table(answer.request.top, answer.family)
     yield record_table("", columns, with_spins, columns)
     yield error_facts(report.content.get("errors"))
-
-
-def _constants_text(top: Top) -> str:
-    """The spin constants of a top, in MHz."""
-    values = top.spin_constants.values if top.spin_constants else {}
-    return ", ".join(f"{name} {value:.6g}" for name, value in values.items())
 
 
 def _table(parent: Top, family: tuple[Isotopologue, ...]) -> Table:
@@ -90,15 +84,12 @@ VERB = Verb(
     rows="isotopologues",
     records=lambda answer: None,
     show=show,
-    outputs=(
-        *tables("the isotopologues", "family"),
-    ),
+    outputs=tables("the isotopologues", "family"),
     subject=OneMolecule(
         ("constants", "isotopes", *POLARIZABILITY, "spin_weights", *STATES, "internal_rotation", *REFINEMENT, "symmetry_tolerance"),
     ),
     shown=ErrorsShown,
     accuracy="of the rotational constants",
-    notes=lambda answer: answer.remarks,
     drawn=None,
     sound=False,
     start={"molecule": "water", "observables.min_abundance": 1e-4, "outputs.csv": "family.csv"},

@@ -12,19 +12,12 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.quantum.effects.stark import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
-from rotor.reports.field_maps import (
-    SHOWN,
-    accuracy_fact,
-    field_fact,
-    refuse_picture_of_one_field,
-    results_of_map,
-    table_of_states,
-)
 from rotor.reports.screen import Table, record_table
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
+from rotor.verbs.common.field_maps import MAP, MAP_FILES, SHOWN, accuracy_fact, field_fact, table_of_states
 from rotor.verbs.common.molecule import REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
-from rotor.verbs.common.outputs import PICTURES, Output, Report, picture, tables
+from rotor.verbs.common.outputs import PICTURES, Output, Report
 from rotor.verbs.common.subjects import OneMolecule
 from rotor.verbs.common.verb import Shown, Verb
 
@@ -121,18 +114,15 @@ def _facts(answer: StarkAnswer, content: Mapping[str, Any]) -> list[tuple[str, s
 
 
 VERB = Verb(
+    **MAP,
     name="stark",
     about="Levels in a static electric field: energies, labels, effective dipoles and cosines for all M; lines and mixtures.",
     examples=EXAMPLES,
     request=StarkRequest,
     answer=lambda request, work: answer_stark(request, work.executor),
-    table=lambda answer: answer.states,
-    results=results_of_map,
-    rows="states",
     show=top_facts.report_on_top(_facts, _table, _coefficient_table, sources=("constants", "dipole")),
     outputs=(
-        *tables("the map", "out"),
-        picture("Draw the map", "out.png"),
+        *MAP_FILES,
         _further("lines", "the lines in every field, resolved in M,"),
         Output("lobes", PICTURES, "Draw the lines against the field (.png, .pdf, .svg)", draw_lines, scene=False),
         _further("spectrum", "the cross section at the highest field"),
@@ -144,12 +134,7 @@ VERB = Verb(
     shown=StarkShown,
     stated=("dipole_abc_debye",),
     drawn="kV/cm",
-    scaled=False,
-    workers="blocks of states",
     small_blocks=True,
-    check=refuse_picture_of_one_field,
-    sound=False,
     numerics="rotor.quantum.fields.numerics:STARK",
-    accuracy="of the energies",
     start={"molecule": "OCS", "conditions.field": "0:200kV/cm:201", "outputs.csv": "stark.csv"},
 )

@@ -9,20 +9,14 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.quantum.effects.zeeman import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
-from rotor.reports.field_maps import (
-    accuracy_fact,
-    field_fact,
-    refuse_picture_of_one_field,
-    results_of_map,
-    table_of_states,
-)
 from rotor.reports.screen import Table
 from rotor.requests.field import CONDITIONS, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, within
 from rotor.requests.lists import Numbers
 from rotor.tops.magnetic import MagneticTensors, tensor_for
+from rotor.verbs.common.field_maps import MAP, MAP_FILES, accuracy_fact, field_fact, table_of_states
 from rotor.verbs.common.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
-from rotor.verbs.common.outputs import Report, picture, tables
+from rotor.verbs.common.outputs import Report
 from rotor.verbs.common.subjects import OneMolecule
 from rotor.verbs.common.verb import Verb
 
@@ -100,33 +94,19 @@ def _tensor_text(tensor: Tensor) -> str:
 
 
 VERB = Verb(
+    **MAP,
     name="zeeman",
     about="Levels in a static magnetic field: energies, labels and magnetic moments for all M, optionally with nuclear spins.",
     examples=EXAMPLES,
     request=ZeemanRequest,
     answer=lambda request, work: answer_zeeman(request, work.executor),
-    table=lambda answer: answer.states,
-    results=results_of_map,
-    rows="states",
     show=top_facts.report_on_top(_facts, _table),
-    outputs=(
-        *tables("the map", "out"),
-        picture("Draw the map", "out.png"),
-    ),
-    subject=OneMolecule(
-        (*DIPOLE, *POLARIZABILITY, "spin_weights", *REFINEMENT, *STATES),
-        with_tensors,
-        MagneticInput,
-    ),
+    outputs=MAP_FILES,
+    subject=OneMolecule((*DIPOLE, *POLARIZABILITY, "spin_weights", *REFINEMENT, *STATES), with_tensors, MagneticInput),
     stated=("g_abc", "magnetisability_abc", "nuclear_g"),
     drawn="T",
-    scaled=False,
-    workers="blocks of states",
     small_blocks=True,
-    check=refuse_picture_of_one_field,
-    sound=False,
     numerics="rotor.quantum.fields.numerics:ZEEMAN",
-    accuracy="of the energies",
     accuracy_example="1 Hz",
     start={"molecule": "OCS", "magnetic.g": [-0.03], "conditions.field": "0:5T:51", "outputs.csv": "zeeman.csv"},
 )

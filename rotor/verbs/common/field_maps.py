@@ -1,4 +1,4 @@
-"""Facts and table of a map of levels in a static field."""
+"""Facts and table of a map of levels in a static field, and what its verbs have in common."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.reports.screen import Table, record_table
 from rotor.requests.fill import NamedError
 from rotor.table import counted
+from rotor.verbs.common.outputs import picture, tables
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -57,3 +58,16 @@ def results_of_map(answer: Any) -> dict[str, Any]:
     states = answer.states
     curves = [states.energy_mhz[rows] for rows in states.curves()]
     return {"levels": len(curves), "largest_shift_mhz": max(abs(curve[-1] - curve[0]) for curve in curves)}
+
+
+MAP: dict[str, Any] = {
+    "table": lambda answer: answer.states,
+    "results": results_of_map,
+    "rows": "states",
+    "scaled": False,
+    "workers": "blocks of states",
+    "check": refuse_picture_of_one_field,
+    "sound": False,
+    "accuracy": "of the energies",
+}  # of verbs with a map
+MAP_FILES = (*tables("the map", "out"), picture("Draw the map", "out.png"))
