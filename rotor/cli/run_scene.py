@@ -291,7 +291,6 @@ VERB = Tool(
     of="scene",
     shown=ErrorsShown,
     answer=answer,
-    notes=lambda answer: answer.notes,
     failure=lambda answer: answer.failure,
     text=lambda answer, content: answer.json(content),
     show=lambda answer, report: answer.parts(report),

@@ -106,6 +106,7 @@ class FluidAnswer(TextOf):
     """A run: the table, the final atoms, and the start.
 
     equilibration: of a box that was made. motion: reorientation and diffusion of the run; motion_reason: why parts are missing.
+    centres: of mass (frames, n, 3) in Å over the second half of the run or at its end, for its picture.
     """
 
     shown = "record"
@@ -117,6 +118,7 @@ class FluidAnswer(TextOf):
     equilibration: Equilibration | None = None
     motion: tuple[Mean, ...] = ()
     motion_reason: str = ""
+    centres: Any = None
 
     @property
     def averaged_share(self) -> float:

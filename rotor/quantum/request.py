@@ -143,7 +143,7 @@ class LevelsAnswer(TextOf):
     table: SelectedLevels
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[str, ...]:
         """The limits of these levels, in sentences."""
         return warnings_of(self.request.top, self.table.levels)
 
@@ -172,7 +172,7 @@ class LevelsAnswer(TextOf):
             "level_count": len(self.table),
             "ground_mhz": self.table.ground_mhz,
             "hyperfine": hyperfine_facts(request.top, self.table.levels),
-            "notes": [*request.top.notes, *self.warnings],
+            "notes": [*request.top.notes, *self.notes],
             **limit_facts(request.top, max(request.jmax, 1), self.table.levels.effects),
             "errors": self.errors.as_json(),
         }

@@ -14,10 +14,10 @@ from rotor.quantum.quanta import headings
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, listed, record_table, table_records
 from rotor.reports.top_facts import error_facts, hyperfine_lines, short_source
-from rotor.requests.field import OUTPUT, REQUIRED, all_fields, declared, declared_fields
+from rotor.requests.field import REQUIRED, all_fields, declared, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
-from rotor.requests.readers import Custom, Field, Quantity, Text, Whole
+from rotor.requests.readers import Custom, Field, Quantity, Text
 from rotor.spectra.emission.request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
 from rotor.verbs.common.molecule import (
@@ -26,13 +26,12 @@ from rotor.verbs.common.molecule import (
     MoleculeInput,
     Reading,
     range_without_unit,
-    read_molecule,
     top_of,
     with_some_dipole,
 )
 from rotor.verbs.common.outputs import Report, picture, table_file, tables
 from rotor.verbs.common.subjects import beside, saved_molecule
-from rotor.verbs.common.verb import Place, Shown, Subject, SubjectKind, Verb
+from rotor.verbs.common.verb import LinesShown, Place, Subject, SubjectKind, Verb
 from rotor.verbs.measurements.emission_observed import OBSERVED
 from rotor.verbs.measurements.observed_file import SeveralInput, is_catalogue
 
@@ -122,7 +121,7 @@ class SeveralMolecules(SubjectKind):
         values = {name: value for name, value in entries.values.items() if name.startswith("molecule.")}
         return [
             (
-                read_molecule(Entries({**values, "molecule.source": source}, entries.style)),
+                read_instance(MoleculeInput, Entries({**values, "molecule.source": source}, entries.style)),
                 {"partition": several.partition} if is_catalogue(source) and several.partition else {},
             )
             for source in several.names
@@ -166,13 +165,6 @@ def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:
     if "note" in species.identity:
         reading.note(f"{path}: {species.identity['note']}; --partition states another")
     return species
-
-
-@dataclass(frozen=True)
-class EmissionShown(Shown):
-    """Display options of `emission`."""
-
-    top_lines: int = declared(20, Whole(0), "Number of brightest lines shown", option="--top", panel=OUTPUT)
 
 
 def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
@@ -288,8 +280,7 @@ VERB = Verb(
         picture("Draw T_B of all molecules", "emission.png"),
     ),
     subject=SeveralMolecules(),
-    shown=EmissionShown,
-    notes=lambda answer: answer.notes,
+    shown=LinesShown,
     stated=("molecules", "source", "range_mhz"),
     drawn="MHz",
     spectral=True,

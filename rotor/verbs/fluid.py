@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from math import isnan
 from pathlib import Path
 from tempfile import gettempdir
@@ -27,13 +27,11 @@ from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, decla
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
-from rotor.verbs.common.outputs import Output, Report, drawing, picture
+from rotor.verbs.common.outputs import Output, Report, picture
 from rotor.verbs.common.subjects import beside
 from rotor.verbs.common.verb import Place, Shown, Subject, SubjectKind, Verb, Work, facts_named
 
 if TYPE_CHECKING:
-    from ase import Atoms
-
     from rotor.arrays import Floats
 
 FRAMES = (".traj", ".xyz", ".extxyz")
@@ -111,10 +109,14 @@ class Box(SubjectKind):
         path = str(Path(place.folder) / str(file))
         if not Path(path).is_file() and not in_scene:
             raise ValueError(f"{file}: no such file; for a new box of 'water' or of a model give --molecules N")
+        from rotor.formats.boxes import read_box
+
         try:
-            values = {"box": _read(path), "box_source": file, **_equilibration(inputs, entries)}
+            values: dict[str, Any] = {"box": read_box(path), "box_source": file}
         except ValueError as error:
             raise ValueError(f"conditions.box: {error}" if in_scene else str(error)) from None
+        if entries.has(self.fields["conditions.equilibration"]):  # none unless it is requested
+            values["box_equilibration_ps"] = inputs.equilibration
         return Subject(values, (), path if in_scene else str(file), place.note)
 
     def _refuse_unused(self, inputs: BoxInput, settings: Settings, entries: Entries) -> None:
@@ -140,18 +142,6 @@ class Box(SubjectKind):
         if request.box_equilibration_ps == 0:
             return files
         return files | written_fields(BoxInput(equilibration=request.box_equilibration_ps))
-
-
-def _equilibration(inputs: BoxInput, entries: Entries) -> dict[str, Any]:
-    """The equilibration of a box from a file: none unless it is requested."""
-    field = all_fields(BoxInput)["conditions.equilibration"]
-    return {"box_equilibration_ps": inputs.equilibration} if entries.has(field) else {}
-
-
-def _read(path: str) -> Atoms:
-    from rotor.formats.boxes import read_box
-
-    return read_box(path)
 
 
 def _refuse_other_model(source: str, settings: Settings) -> None:
@@ -186,13 +176,6 @@ class FluidShown(Shown):
     resume: bool = declared(False, Flag(), "Continue from the checkpoint", panel=OUTPUT)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class DrawnFluid(FluidAnswer):
-    """A run and the data of its picture. centres: of mass (frames, n, 3) in Å, over the second half of the run or at its end."""
-
-    centres: Any = None
-
-
 def answer(request: FluidRequest, work: Work) -> FluidAnswer:
     """The run; a scene resumes from its checkpoint if that exists.
 
@@ -220,10 +203,7 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
             run = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
             if csv is not None:
                 _add_errors(csv, run)
-            if "plot" not in work.files:
-                return run
-            values = {field.name: getattr(run, field.name) for field in fields(FluidAnswer)}
-            return DrawnFluid(**values, centres=_centres(run, frames))
+            return replace(run, centres=_centres(run, frames)) if "plot" in work.files else run
     except RunStopped as error:
         raise NoAnswerError(str(error)) from error
 
@@ -351,12 +331,11 @@ VERB = Verb(
             example="run.npz",
             grows=True,
         ),
-        picture("Draw temperatures, energy and g(r)", "run.png", drawing(centres=lambda answer, _: answer.centres)),
+        picture("Draw temperatures, energy and g(r)", "run.png"),
     ),
     subject=Box(),
     shown=FluidShown,
     content=lambda answer, shown: _settings(answer.request),
-    notes=lambda answer: answer.notes,
     drawn="ps",
     scaled=False,
     sound=False,

@@ -125,7 +125,6 @@ VERB = Verb(
     ),
     subject=OneMolecule((*DIPOLE, *POLARIZABILITY, "state_dipoles")),
     shown=LevelsShown,
-    notes=lambda answer: answer.warnings,
     nothing=lambda answer: "" if len(answer.table) else "no level in this range",
     scaled=False,
     extras=(

@@ -95,7 +95,6 @@ VERB = Verb(
     ),
     shown=LinesShown,
     content=lambda answer, shown: {"strongest": answer.strongest(shown.top_lines)},
-    notes=lambda answer: answer.notes,
     nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
     drawn="cm-1",
     numerics="rotor.spectra.numerics:RAMAN",

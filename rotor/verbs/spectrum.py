@@ -260,14 +260,11 @@ def _count_text(answer: SpectrumAnswer, count: int) -> str:
 
 def answer_of(request: SpectrumRequest, work: Work) -> SpectrumAnswer:
     """The lines of a request or of SPCAT's files; long lists are sorted on disk."""
-    predicted, executor = isinstance(request, int_files.PredictedRequest), work.executor
-    if not predicted and is_long(request, work.files, getattr(work.shown, "resolution", None)):
+    if isinstance(request, int_files.PredictedRequest):
+        return SpectrumAnswer(request, request.prediction.lines)
+    if is_long(request, work.files, getattr(work.shown, "resolution", None)):
         return answer_long(request, work.files, getattr(work.shown, "top_lines", 0), work.progress)
-    return (
-        int_files.answer_of(request)
-        if isinstance(request, int_files.PredictedRequest)
-        else answer_spectrum(request, executor)
-    )
+    return answer_spectrum(request, work.executor)
 
 
 def results(answer: Any) -> dict[str, Any]:
@@ -335,7 +332,6 @@ VERB = Verb(
     subject=MoleculeOrFile(POLARIZABILITY, lambda top, reading, entries: with_some_dipole(top, reading)),
     shown=SpectrumShown,
     content=content,
-    notes=lambda answer: answer.notes,
     nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
     drawn="MHz",
     spectral=True,

@@ -207,7 +207,6 @@ VERB = Verb(
     numerics="rotor.formats.fits.structure_request:STRUCTURE",
     accuracy="of the bond lengths",
     accuracy_example="0.001 Å",
-    notes=lambda answer: answer.notes,
     drawn=None,
     sound=False,
     failure=failure,

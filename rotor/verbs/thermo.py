@@ -136,7 +136,6 @@ VERB = Verb(
     },
     rows="functions",
     show=top_facts.report_on_top(_facts, _rotation_table, _gas_table, sources=("constants", "spin weights")),
-    notes=lambda answer: answer.notes,
     outputs=(
         *tables("the table", "out"),
         picture("Draw the heat capacity", "out.png"),

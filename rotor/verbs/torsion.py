@@ -150,7 +150,6 @@ VERB = Verb(
         ("constants", *DIPOLE, *POLARIZABILITY, "spin_weights", *NUCLEI, *STATES, "hessian", "internal_rotation", "symmetry_tolerance"),
     ),
     content=lambda answer, shown: {"functions": table_records(answer.functions)},
-    notes=lambda answer: answer.warnings,
     numerics="rotor.thermodynamics.numerics:TORSION",
     accuracy="of the levels",
     sound=False,  # errors of potentials and scans arise during the calculation

@@ -85,7 +85,7 @@ class IsotopologuesAnswer:
         return IsotopologueTable(self.family)
 
     @property
-    def remarks(self) -> list[str]:
+    def notes(self) -> list[str]:
         """Notes that the parent does not have, each once with its isotopologues."""
         about: dict[str, list[str]] = {}
         for each in self.family:

@@ -17,12 +17,13 @@ TIME = "Time (ps)"
 ENSEMBLES = {"nve": "constant energy", "langevin": "Langevin thermostat", "nose-hoover": "Nosé-Hoover thermostat"}
 
 
-def picture(answer: FluidAnswer, *, title: str | None = None, view: View = WHOLE, centres: Any = None) -> Picture:
-    """The picture of a run; view: of times (ps) and temperatures.
-
-    centres: of mass (frames, n, 3) in Å; with them, a periodic box also has its pair distribution.
-    """
-    settings, molecules = answer.request.settings, len(np.unique(answer.atoms.arrays["molecule"]))
+def picture(answer: FluidAnswer, *, title: str | None = None, view: View = WHOLE) -> Picture:
+    """The picture of a run; view: of times (ps) and temperatures. With its centres, a periodic box also has its pair distribution."""
+    settings, centres, molecules = (
+        answer.request.settings,
+        answer.centres,
+        len(np.unique(answer.atoms.arrays["molecule"])),
+    )
     shells = None if centres is None else _shells(answer.atoms, centres)
     engine = "" if answer.request.engine == "rotor" else f", {answer.request.engine}"
     default = f"{molecules} molecules, {settings.model}, {ENSEMBLES[settings.ensemble]}{engine}"

@@ -326,7 +326,7 @@ class TorsionAnswer(TextOf):
         }  # fmt: skip
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[str, ...]:
         """Warnings about the scan: a barrier far from the measured one, and a path that does not close."""
         if self.scan is None:
             return ()

@@ -114,11 +114,6 @@ def with_names(prediction: Prediction, source: Path) -> Prediction:
     return replace(prediction, lines=replace(lines, top=top, levels=levels))
 
 
-def answer_of(request: PredictedRequest) -> SpectrumAnswer:
-    """The lines of the prediction."""
-    return SpectrumAnswer(request, request.prediction.lines)
-
-
 def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Write the catalogue as SPCAT does: with its weights, its zero of energy, and K doublets as two lines."""
     from rotor.formats.spcat.text.cat import write_cat

@@ -166,7 +166,7 @@ class Verb:
     answer: computes a request. table: of an answer, by default its `table`; rows: its key in the JSON.
     records: rows of the JSON if not the table.
     results: a few numbers of an answer with rows, by name with units, for the table of a sweep.
-    content: further keys of the JSON. notes: remarks on an answer. failure: reason why an answer is not a result.
+    content: further keys of the JSON. notes: remarks on an answer, by default its `notes`. failure: reason why an answer is not a result.
     outputs: files. withheld: reasons why some of them are not written. stated: keys of the JSON in the provenance of files.
     show: the parts of the report, which are printed with blank lines about tables. stepwise: whether every step is shown from the start.
     lists_files: whether the report names its files by itself.
@@ -193,7 +193,7 @@ class Verb:
     table: Callable[[Any], Table] = lambda answer: answer.table
     shown: type = Shown
     content: Callable[[Any, Any], Mapping[str, Any]] = lambda answer, shown: {}
-    notes: Callable[[Any], Iterable[str]] = lambda answer: ()
+    notes: Callable[[Any], Iterable[str]] = lambda answer: getattr(answer, "notes", ())
     nothing: Callable[[Any], str] = lambda answer: ""
     drawn: str | None = ""
     spectral: bool = False
