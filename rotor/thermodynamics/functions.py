@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +33,14 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
 from rotor.thermodynamics.electronic import ElectronicStates, electronic_states
 from rotor.thermodynamics.sums.classical_limit import classical_limit
-from rotor.thermodynamics.sums.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
+from rotor.thermodynamics.sums.level_sums import (
+    AT_WORST,
+    LevelSums,
+    Progress,
+    checked_temperatures,
+    level_sums,
+    lowest_level_k,
+)
 from rotor.thermodynamics.sums.species import implied_symmetry_number, spin_species
 from rotor.thermodynamics.vibration import VibrationalStates, vibrational_functions
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -100,6 +107,11 @@ class ThermoFunctions(Table):
     def __len__(self) -> int:
         return len(self.temperature_k)
 
+    def where(self, chosen: NDArray[np.bool_]) -> ThermoFunctions:
+        """The functions at chosen temperatures."""
+        gas = self.gas and replace(self.gas, **_chosen_rows(self.gas, chosen))
+        return replace(self, **_chosen_rows(self, chosen), gas=gas)
+
     @property
     def provenance(self) -> dict[str, Any]:
         """Inputs of the functions: the top and its sources, species, vibration, pressure, and the errors of the sums."""
@@ -137,6 +149,12 @@ class ThermoFunctions(Table):
         return out
 
 
+def _chosen_rows(columns: Any, chosen: NDArray[np.bool_]) -> dict[str, Any]:
+    """The arrays of an object by name, at chosen temperatures."""
+    values = {field.name: getattr(columns, field.name) for field in fields(columns)}
+    return {name: value[chosen] for name, value in values.items() if isinstance(value, np.ndarray)}
+
+
 def species_names(top: Top) -> list[str]:
     """The values of `species` that `thermodynamic_functions` accepts for this top.
 
@@ -159,6 +177,7 @@ def thermodynamic_functions(
     relative_error: float = 1e-6,
     progress: Progress | None = None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    refuse: bool = True,
 ) -> ThermoFunctions:
     """Partition function, energy, entropy and heat capacity of a top at many temperatures, quantum and classical.
 
@@ -176,6 +195,7 @@ def thermodynamic_functions(
         constants are populated; `ThermoFunctions.relative_error` is the error reached.
     progress : called as `progress(j, last)` during a long sum.
     effects : effects in the Hamiltonian; with spins Q counts their functions, see `rotor.thermodynamics.sums.spin_sums`.
+    refuse : False: return functions with a larger error too, for a caller that checks `ThermoFunctions.relative_error`.
 
     Returns
     -------
@@ -197,9 +217,10 @@ def thermodynamic_functions(
     temperatures = checked_temperatures(temperatures_k)
     effects = tuple(effects)
     if any(effect.spins(top) for effect in effects):
-        rotation = _with_spins(top, species, parts, fractions, temperatures, relative_error, effects, progress)
+        rotation = _with_spins(top, species, parts, fractions, temperatures, relative_error, effects, progress, refuse)
     else:
-        sums = level_sums(top, list(parts.values()), temperatures, relative_error, progress=progress, effects=effects)
+        settings: dict[str, Any] = {"progress": progress, "effects": effects, "refuse": refuse}
+        sums = level_sums(top, list(parts.values()), temperatures, relative_error, **settings)
         rotation = _rotation(top, species, parts, fractions, sums, effects)
     if pressure_bar is None:
         return _with_vibration(rotation, vibrations)
@@ -259,6 +280,7 @@ def _with_spins(
     relative_error: float,
     effects: tuple[QuantumEffect, ...],
     progress: Progress | None,
+    refuse: bool,
 ) -> ThermoFunctions:
     """The functions of rotation with spins."""
     from rotor.quantum.hyperfine_method import EXACT, HyperfineMethod
@@ -266,16 +288,17 @@ def _with_spins(
     from rotor.thermodynamics.sums.spin_sums import spin_sums
 
     refuse_species_with_totals(top, species, effects)
-    spin_result = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress)
-    counted = spin_result.split.any()
+    spin_result = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress, refuse=refuse)
+    rotation = _rotation(top, species, parts, fractions, spin_result.sums, effects)
+    counted = spin_result.split & (rotation.relative_error <= AT_WORST)
     method = next((effect.method for effect in effects if isinstance(effect, HyperfineMethod)), EXACT)
     hyperfine = {
         "spin_functions": spin_functions(top, effects),
         "splitting_mhz": spin_result.splitting_mhz,
-        "summed_up_to_k": float(temperatures[spin_result.split].max()) if counted else None,
+        "summed_up_to_k": float(temperatures[counted].max()) if counted.any() else None,
         "method": method,
     }
-    return replace(_rotation(top, species, parts, fractions, spin_result.sums, effects), hyperfine=hyperfine)
+    return replace(rotation, hyperfine=hyperfine)
 
 
 def _rotation(

@@ -32,7 +32,7 @@ from rotor.thermodynamics.functions import (
 )
 from rotor.thermodynamics.sums.classical_limit import classical_limit, populated_j, rotational_temperatures_k
 from rotor.thermodynamics.sums.classical_onset import classical_above_if_known
-from rotor.thermodynamics.sums.level_sums import OutOfReachError, Progress
+from rotor.thermodynamics.sums.level_sums import AT_WORST, OutOfReachError, Progress, refusal
 from rotor.thermodynamics.vibration import VibrationalStates, missing_fundamentals
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts
@@ -251,21 +251,9 @@ def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> T
     >>> round(float(answer.functions.cv_over_r[0]), 4)  # 1 + (Θ/T)²/45
     1.0001
     """
-    temperatures, refused = request.temperatures_k, dict[float, str]()
-    while True:
-        try:
-            return ThermoAnswer(request, _functions(request, temperatures, progress), refused)
-        except OutOfReachError as error:  # species of a mixture can be refused at different temperatures
-            rest = [t for t in temperatures if t not in error.reasons]
-            if not rest:
-                raise
-            temperatures, refused = rest, refused | dict(error.reasons)
-
-
-def _functions(request: ThermoRequest, temperatures_k: Sequence[float], progress: Progress | None) -> ThermoFunctions:
-    return thermodynamic_functions(
+    functions = thermodynamic_functions(
         request.top,
-        temperatures_k,
+        request.temperatures_k,
         species=request.species,
         vibrations=request.vibrations,
         pressure_bar=request.pressure_bar,
@@ -273,4 +261,13 @@ def _functions(request: ThermoRequest, temperatures_k: Sequence[float], progress
         relative_error=request.relative_error,
         progress=progress,
         effects=request.effects,
+        refuse=False,
     )
+    inexact = functions.relative_error > AT_WORST
+    if not inexact.any():
+        return ThermoAnswer(request, functions)
+    errors = zip(functions.temperature_k[inexact].tolist(), functions.relative_error[inexact].tolist(), strict=True)
+    refused = {temperature: refusal(temperature, error) for temperature, error in errors}
+    if inexact.all():
+        raise OutOfReachError(refused)
+    return ThermoAnswer(request, functions.where(~inexact), refused)
