@@ -75,7 +75,11 @@ def solve_levels(
     if jmax < 0 or jmin < 0 or jmin > jmax:
         raise ValueError(f"J from {jmin} to {jmax}: J max must be 0 or more and not below J min")
     _refuse_too_many(top.kind, jmin, jmax)
-    top, effects = _with_states(top, effects)
+    effects = tuple(effects)
+    if top.states is not None or top.internal_rotation is not None:
+        from rotor.quantum.effects.of_top import with_states
+
+        top, effects = with_states(top, effects)
     for effect in effects:
         if effect.resolves_m:
             raise ValueError(
@@ -90,18 +94,6 @@ def solve_levels(
 
         return spin_levels(top, effects, jmin, jmax, executor)
     return as_tabulated(top, effects, solve_rotation(top, effects, jmin, jmax, vectors, executor, below_mhz=below_mhz))
-
-
-def _with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple[QuantumEffect, ...]]:
-    if top.internal_rotation is not None and tuple(effects) == SEMI_RIGID:
-        from rotor.quantum.effects.of_top import internal_rotation_effects
-
-        effects = (*effects, *internal_rotation_effects(top))
-    if top.states is None:
-        return top, tuple(effects)
-    from rotor.quantum.effects.of_top import with_states
-
-    return with_states(top, top.states, effects)
 
 
 def _refuse_too_many(kind: str, jmin: int, jmax: int) -> None:

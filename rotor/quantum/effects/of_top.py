@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
     from rotor.tops.spins.spin_constants import SpinConstants
     from rotor.tops.spins.spin_weights import SpinWeights
-    from rotor.tops.states.state_constants import StateConstants
     from rotor.tops.top import Top
 
 
@@ -148,17 +147,16 @@ def internal_rotation_effects(top: Top) -> tuple[QuantumEffect, ...]:
     return (InternalRotation(top.internal_rotation),)
 
 
-def with_states(
-    top: Top, states: StateConstants, effects: Sequence[QuantumEffect]
-) -> tuple[Top, tuple[QuantumEffect, ...]]:
+def with_states(top: Top, effects: tuple[QuantumEffect, ...]) -> tuple[Top, tuple[QuantumEffect, ...]]:
     """The top with the spin weights of its state v = 0, and the effects of a calculation with all its states.
 
-    The states v ≥ 1 are added to the semi-rigid effects; any other effects remain unchanged.
+    States v ≥ 1 and internal rotation are added to the semi-rigid effects; any other effects remain unchanged.
     """
-    effects = tuple(effects)
     if effects == SEMI_RIGID:
-        effects = (*effects, *state_effects(top))
-    weights = states.weights.get(0, top.spin_weights)
+        effects = effects_of(top, False)
+    if top.states is None:
+        return top, effects
+    weights = top.states.weights.get(0, top.spin_weights)
     return replace(top, spin_weights=weights, symmetry_checked=False), effects
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats
 from rotor.quantum.coupled_levels import Model, coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
@@ -89,12 +89,6 @@ def _closed_form_holds(kind: str, operators: Operators) -> bool:
     return all(n == 0 for _, _, n in operators)
 
 
-def _scalar_energies(operators: Operators, jmin: int, jmax: int) -> tuple[Ints, Floats]:
-    """J and Σ c X^p for each."""
-    j = np.arange(jmin, jmax + 1)
-    return j, np.array([scalar_energy(operators, int(value)) for value in j])
-
-
 def _linear(
     top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int, in_blocks: bool
 ) -> Levels:
@@ -107,7 +101,8 @@ def _linear(
             f"{what}: a linear top in a Σ state has K = 0 and operators of J² alone; give the top an axis (kind prolate) or "
             "leave the effect out"
         )
-    j, energy = _scalar_energies(operators, jmin, jmax)
+    j = np.arange(jmin, jmax + 1)
+    energy = diagonal_elements(operators, j, 0 * j)
     if not in_blocks:
         return levels_table(top, effects, jmax, energy, {"j": j})
     functions = [WangBlock(number, "eo" if number % 2 else "ee", 0, 1, 1) for number in j.tolist()]
@@ -118,7 +113,8 @@ def _linear(
 def _spherical(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int) -> Levels:
     """Spherical tops: E = Σ c X^p with one row of 2J+1 components for each J, or with one row for each level that D_t splits."""
     scalars, dt = scalar_and_tensor(operators)
-    j, energy = _scalar_energies(scalars, jmin, jmax)
+    j = np.arange(jmin, jmax + 1)
+    energy = diagonal_elements(scalars, j, 0 * j)
     if not dt:
         return levels_table(top, effects, jmax, energy, {"j": j}, components=2 * j + 1)
     split = [tensor_eigenvalues(int(value), 1 if dt > 0 else -1) for value in j]

@@ -28,6 +28,7 @@ from rotor.spectra.raman.raman import raman_lines
 from rotor.spectra.transitions.pairs import all_transitions
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.thermodynamics.sums.partition import partition_function
+from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import GROUPS, StateConstants
@@ -360,3 +361,14 @@ def test_command_line_shows_states(folder, call):
 def test_the_size_of_a_coupling_is_that_at_k_equal_to_j(name, power):
     top = Top.from_constants("A=9 B=6 C=5 GHz")
     assert InteractingStates({"E[1]": 1e5, name: -3.0}).size_mhz(top, 5) == 3.0 * 5**power
+
+
+def test_states_beside_internal_rotation_are_refused():
+    """Not left out in silence where the effects are those by default."""
+    methyl = InternalRotationConstants({"F": 2.3e5, "rho": 0.33, "V3": 1.2e7}, "RAM")
+    second = {"E[1]": 1e3, "A[1]": 56e3, "B[1]": 10e3, "C[1]": 9e3}
+    top = Top.from_constants(
+        "A=56505.9 B=10454.1 C=9089.2 MHz", states=StateConstants(second), internal_rotation=methyl
+    )
+    with pytest.raises(ValueError, match="interacting states beside internal rotation"):
+        solve_levels(top, 1)
