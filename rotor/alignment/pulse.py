@@ -375,9 +375,8 @@ def pulse_of_numbers(shape: str, text: str, **others: Any) -> Pulse:
     least, units = sum(fields[key].default is REQUIRED for key in keys), [fields[key].reader.unit for key in keys]
     if not least <= len(parts) <= len(keys):
         count = f"{least}" if least == len(keys) else f"{least} to {len(keys)}"
-        raise ValueError(
-            f"{text!r}: expected {count} numbers between commas, in {', '.join(units)}; found {len(parts)}"
-        )
+        named = ", ".join(f"{key} ({unit})" for key, unit in zip(keys, units, strict=True))
+        raise ValueError(f"{text!r}: expected {count} numbers with commas between: {named}; found {len(parts)}")
     values = {fields[key].name: fields[key].read(part, "key") for key, part in zip(keys, parts, strict=False)}
     return SHAPES[shape](**values, **others)
 

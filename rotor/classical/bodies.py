@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotor.checks import did_you_mean
 from rotor.geometry.inertia import Body, box, cylinder, hoop, rod
 
 Three = tuple[float, float, float]
@@ -90,4 +91,4 @@ def named_body(name: str) -> NamedBody:
     for body_name, body in BODIES.items():
         if body_name.replace(" ", "") == key:
             return body
-    raise ValueError(f"{name!r}: expected one of {', '.join(BODIES)}")
+    raise ValueError(f"{name!r}: expected one of {', '.join(BODIES)}{did_you_mean(name.casefold(), BODIES)}")

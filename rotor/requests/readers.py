@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import MISSING
+from decimal import Decimal
 from numbers import Real
 from typing import Any
 
@@ -207,6 +208,11 @@ class Whole(Reader):
             r"\s*[+-]?[0-9]{1,4000}\s*", raw
         ):  # int() takes 1_000 and other scripts, too
             value = int(raw)
+        elif isinstance(raw, str) and re.fullmatch(
+            r"\s*[0-9]{1,9}(\.[0-9]{1,9})?[eE]\+?[0-9]{1,2}\s*", raw
+        ):  # such as 1e5
+            number = Decimal(raw.strip())
+            value = int(number) if number == number.to_integral_value() else raw
         if isinstance(value, bool) or not hasattr(value, "__index__"):
             raise ValueError(f"{raw!r:.60}: expected a whole number")
         if abs(value) > MOST_WHOLE:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 import rotor
@@ -36,11 +38,11 @@ def test_the_function_takes_a_text_or_a_list_of_both_forms():
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("1e13 W/cm2", "expected 2 to 3 numbers between commas, in W/cm2, ps, ps; found 1"),
+        ("1e13 W/cm2", "expected 2 to 3 numbers with commas between: peak (W/cm2), fwhm (ps), centre (ps); found 1"),
         ("1e13 W/m, 1 ps", "peak: '1e13 W/m': unit"),
         ("gausian 1e13, 1", "no shape is named 'gausian 1e13, 1'; the nearest is 'gaussian'"),
     ],
 )
 def test_a_wrong_text_is_named(text, reason):
-    with pytest.raises(ValueError, match=reason):
+    with pytest.raises(ValueError, match=re.escape(reason)):
         rotor.align("OCS", pulses=text)

@@ -255,6 +255,12 @@ MISTAKES = [
     (("water", "--csv", "a.txt"), "--csv a.txt: the name must end in .csv"),
     (("water", "--gif", "a.avi"), "--gif a.avi: the name must end in .gif or .mp4"),
     (("atom.xyz",), "is a single atom"),
+    (("--body", "rackett"), "wing nut; did you mean racket?"),
+    (("rackett",), "'rackett' is no file, no molecule and no body; did you mean racket?"),
+    (
+        ("book", "--temperature", "300"),
+        "--temperature: bare moments and bodies have no temperature; give --angular-momentum or --omega",
+    ),
     (("--body", "brick"), "--body: 'brick': expected one of book, phone, racket, wing nut"),
     (("water", "--body", "book"), "a molecule and --body: give one of them"),
     (("--body", "book", "--moments", "1,2,3"), "--body and --moments: give one of them"),

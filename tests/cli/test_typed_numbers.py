@@ -109,6 +109,11 @@ REFUSED = [
     (("view", "a.csv", "--rest", "-5GHz"), "--rest: -5GHz: expected a finite number above 0 MHz"),
     (("identify", "a.csv", "--catalogue", "a.cat", "--background", "-5"), "--background: -5: expected a finite number of 0 K or more"),
     (("identify", "a.csv", "--catalogue", "a.cat", "--model-error", "8 K"), "--model-error: '8 K': expected plain numbers"),
+    (("levels", "water", "--jmax", "2.5e0"), "--jmax: '2.5e0': expected a whole number"),
+    (
+        ("align", "OCS", "--pulse", "1e13 W/cm2 1 ps"),
+        "--pulse: '1e13 W/cm2 1 ps': expected 2 to 3 numbers with commas between: peak (W/cm2), fwhm (ps), centre (ps); found 1",
+    ),
     (("levels", "water", "--jmax", "2 K"), "--jmax: '2 K': expected a whole number"),
     (("cat", "a.cat", "--range", "0:100V"), "--range: '0:100V': unit 'V' is not a known unit"),
 ]  # fmt: skip
@@ -155,3 +160,13 @@ def test_a_list_without_a_pulse(call, folder):
 @pytest.mark.parametrize("typed", ["20-600GHz", "20 - 600 GHz", "20GHz-600GHz", "20–600 GHz"])
 def test_a_range_with_a_hyphen_between_two_numbers(call, folder, typed):
     assert call("spectrum", "water", "--range", typed)[:2] == call("spectrum", "water", "--range", "20:600GHz")[:2]
+
+
+def test_whole_numbers_may_have_a_power_of_ten():
+    from rotor.requests.readers import Whole
+
+    read = Whole().read
+    assert [read(text) for text in ("1e5", "2.5E3", " 1e+2 ")] == [100_000, 2500, 100]
+    for text in ("1e-1", "2.55e1", "1e", "e5"):
+        with pytest.raises(ValueError, match="expected a whole number"):
+            read(text)

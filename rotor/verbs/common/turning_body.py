@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from difflib import get_close_matches
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from rotor.checks import did_you_mean
 from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE as MOLECULE_PANEL
@@ -224,17 +226,24 @@ def read_body(entries: Entries) -> Body | None:
     if entries.values.get("molecule.isotopes"):
         raise NamedError("{isotopes}: bare moments have no atoms; give the moments of the isotopologue itself")
     if entries.has(MOTION["temperature_k"]):
-        raise NamedError("{temperature_k}: bare moments have no units for a temperature; give {angular_momentum} alone")
+        raise NamedError(
+            "{temperature_k}: bare moments and bodies have no temperature; give {angular_momentum} or {angular_velocity}"
+        )
     if in_scene and entries.has(MOTION["angular_momentum"]):
         raise NamedError("{angular_momentum}: is for a molecule; for a body give it in [body]")
     return _body_of_moments(entries, inputs) if named is None else _everyday_body(named)
 
 
 def _named_source(source: Any) -> NamedBody | None:
-    """The everyday body that a source names, unless it is a file."""
+    """The everyday body that a source names, unless it is a file; ValueError for a name with a slip."""
     from rotor.classical.bodies import BODIES
 
-    return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
+    if not isinstance(source, str) or Path(source).exists():
+        return None
+    name = source.replace("-", " ").casefold()
+    if name not in BODIES and get_close_matches(name, BODIES, n=1, cutoff=0.8):
+        raise ValueError(f"{source!r} is no file, no molecule and no body{did_you_mean(name, BODIES)}")
+    return BODIES.get(name)
 
 
 def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
