@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from rotor.checks import leaving
 from rotor.frozen import dataclass
-from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared
+from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared, identical, part
 from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
 from rotor.verbs.common.outputs import Output, Report
 from rotor.verbs.common.verb import Tool, Work
-from rotor.verbs.measurements.observed_file import PANEL
+from rotor.verbs.measurements.observed_file import FileFacts
 
 if TYPE_CHECKING:
     from rotor.viewer.service import Service
@@ -46,22 +46,7 @@ class ViewRequest:
         option="--temperature",
         panel=CONDITIONS,
     )
-    axis_unit: str | None = declared(
-        None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, cm-1, km/s", panel=PANEL
-    )
-    rest_mhz: float | None = declared(
-        None,
-        Quantity("MHz", above=0, metavar="F"),
-        "Rest frequency of a velocity axis (MHz)",
-        option="--rest",
-        panel=PANEL,
-    )
-    unit: str | None = declared(
-        None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, V, absorbance, Jy/beam", panel=PANEL
-    )
-    noise: float | None = declared(
-        None, Quantity(), "Noise of a channel; estimated from line-free channels", panel=PANEL
-    )
+    facts: FileFacts = part(FileFacts, identical, identical, FileFacts())
     port: int = declared(0, Whole(0, 65535), "Port on this machine; 0 takes a free port", panel=OUTPUT)
     no_browser: bool = declared(False, Flag(), "Print the address; open no browser", panel=OUTPUT)
 
@@ -88,10 +73,7 @@ def answer(request: ViewRequest, work: Work) -> Opened:
         lines=request.lines,
         session=request.session,
         temperature_k=request.temperature_k,
-        axis_unit=request.axis_unit,
-        rest_mhz=request.rest_mhz,
-        unit=request.unit,
-        noise=request.noise,
+        **vars(request.facts),
         save=page is None,
         note=work.note,
     )

@@ -45,8 +45,8 @@ class SeveralInput:
 
 
 @dataclass(frozen=True)
-class SpectrumFile:
-    """Facts that the file of a spectrum does not state, and corrections before its use."""
+class FileFacts:
+    """Facts that the file of a spectrum does not state."""
 
     rest_mhz: float | None = observed(
         None, Quantity("MHz", above=0, metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest"
@@ -54,9 +54,17 @@ class SpectrumFile:
     unit: str | None = observed(
         None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, Jy/beam, mJy/beam, absorbance"
     )
-    axis_unit: str | None = observed(None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, km/s")
-    frame: str | None = observed(None, Text(metavar="NAME"), "Frame of the frequencies, such as LSRK or SOURCE")
+    axis_unit: str | None = observed(
+        None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, cm-1, km/s"
+    )
     noise: float | None = observed(None, Quantity(), "Noise of a channel; by default estimated from line-free channels")
+
+
+@dataclass(frozen=True)
+class SpectrumFile(FileFacts):
+    """Facts that the file of a spectrum does not state, and corrections before its use."""
+
+    frame: str | None = observed(None, Text(metavar="NAME"), "Frame of the frequencies, such as LSRK or SOURCE")
     beam_arcsec: tuple[float, ...] | None = observed(
         None, Numbers("arcsec", (1, 2), "30 or 30,25", metavar="A[,B]"), "Widths of the beam at half maximum (arcsec)", option="--beam",
     )  # fmt: skip
