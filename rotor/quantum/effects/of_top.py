@@ -128,25 +128,6 @@ def _refuse_like_nuclei(top: Top, constants: SpinConstants) -> None:
         )
 
 
-def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
-    """The states v ≥ 1 of a top with their interactions; empty for a single state."""
-    if top.states is None:
-        return ()
-    from rotor.quantum.effects.interactions import InteractingStates
-
-    states = top.states
-    return (InteractingStates(states.values, states.weights, states.dipoles),)
-
-
-def internal_rotation_effects(top: Top) -> tuple[QuantumEffect, ...]:
-    """Internal rotation of a top with constants for it; empty for others."""
-    if top.internal_rotation is None:
-        return ()
-    from rotor.quantum.effects.internal_rotation import InternalRotation
-
-    return (InternalRotation(top.internal_rotation),)
-
-
 def with_states(top: Top, effects: tuple[QuantumEffect, ...]) -> tuple[Top, tuple[QuantumEffect, ...]]:
     """The top with the spin weights of its state v = 0, and the effects of a calculation with all its states.
 
@@ -187,21 +168,24 @@ def effects_of(
     ValueError
         If spins are requested and the top has no spin constants.
     """
+    effects = SEMI_RIGID
+    if top.states is not None:
+        from rotor.quantum.effects.interactions import InteractingStates
+
+        effects = (*effects, InteractingStates(top.states.values, top.states.weights, top.states.dipoles))
+    if top.internal_rotation is not None:
+        from rotor.quantum.effects.internal_rotation import InternalRotation
+
+        effects = (*effects, InternalRotation(top.internal_rotation))
     if not hyperfine:
-        return (*SEMI_RIGID, *state_effects(top), *internal_rotation_effects(top))
+        return effects
     effects_of_spins = spin_effects(top)
     if not effects_of_spins:
         raise ValueError(
             f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them as spin_constants "
             "(--spin-constants), such as chi_aa(14N)=-4.2 MHz"
         )
-    return (
-        *SEMI_RIGID,
-        *state_effects(top),
-        *internal_rotation_effects(top),
-        *effects_of_spins,
-        *_method(top, effects_of_spins, method, tolerance_mhz),
-    )
+    return (*effects, *effects_of_spins, *_method(top, effects_of_spins, method, tolerance_mhz))
 
 
 def _method(top: Top, effects: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:

@@ -140,31 +140,24 @@ def _pairs(rows: Ints, others: Ints, first: Floats, factor: Floats | None = None
     return csr_array(entries, shape=(len(rows),) * 2)
 
 
-@dataclass(frozen=True)
-class SpinCounts:
-    """Spin functions of two equivalent tops. states: 2I + 1 of a nucleus of a top. pairs: 2I + 1 of further exchanged pairs."""
+def exchanged_functions(states: int, pairs: Sequence[int], sigma: Sequence[int]) -> Ints:
+    """Spin functions (2,) of levels with the signs 1 and -1 under the exchange of two tops, summed over their components.
 
-    states: int = 2
-    pairs: tuple[int, ...] = ()
+    states: 2I + 1 of a nucleus of a top. pairs: 2I + 1 of further exchanged pairs.
 
-    def functions_of_species(self, sigma: tuple[int, ...], x: Ints) -> Ints:
-        """Spin functions (levels,) of levels with a sign x under the exchange, summed over their components.
-
-        >>> counts = SpinCounts(2)
-        >>> [counts.functions_of_species(sigma, np.array([1, -1])).tolist() for sigma in ((0, 0), (1, 1), (1, -1), (0, 1))]
-        [[6, 10], [2, 6], [4, 4], [16, 16]]
-        >>> SpinCounts(2, (2,)).functions_of_species((0, 0), np.array([1, -1])).tolist()  # propane: the hydrogens of CH2 are exchanged too
-        [36, 28]
-        """
-        n, all_pairs, trace = self.states, math.prod(m * m for m in self.pairs), math.prod(self.pairs)
-        d = spin_functions(n)
-        first, second = (d[abs(number)] for number in sigma)
-        if sigma[0] != sigma[1]:
-            return np.full(len(x), first * second * all_pairs * (1 if all(sigma) else 2))
-        fermions = 3 * (n % 2 == 0) + sum(m % 2 == 0 for m in self.pairs)
-        # sign of the spin function, so that the product is symmetric or antisymmetric as the nuclei demand
-        y = x * (-1 if fermions % 2 else 1)
-        return np.asarray((first**2 * all_pairs + y * first * trace) // (2 if not any(sigma) else 1))
+    >>> [exchanged_functions(2, (), sigma).tolist() for sigma in ((0, 0), (1, 1), (1, -1), (0, 1))]
+    [[6, 10], [2, 6], [4, 4], [16, 16]]
+    >>> exchanged_functions(2, (2,), (0, 0)).tolist()  # propane: the hydrogens of CH2 are exchanged too
+    [36, 28]
+    """
+    all_pairs, d = math.prod(m * m for m in pairs), spin_functions(states)
+    first, second = (d[abs(number)] for number in sigma)
+    if sigma[0] != sigma[1]:
+        return np.full(2, first * second * all_pairs * (1 if all(sigma) else 2))
+    fermions = 3 * (states % 2 == 0) + sum(m % 2 == 0 for m in pairs)
+    # sign of the spin function, so that the product is symmetric or antisymmetric as the nuclei demand
+    y = np.array([1, -1]) * (-1 if fermions % 2 else 1)
+    return np.asarray((first**2 * all_pairs + y * first * math.prod(pairs)) // (2 if not any(sigma) else 1))
 
 
 def exchange_axis(first: Floats, second: Floats, tolerance: float) -> str:

@@ -16,7 +16,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.blocks import ByBlocks, Entries, elements_by_blocks
 from rotor.quantum.internal_rotation.chain_rule import NO_CHAIN, ChainRule, chain_rule, further_operators
 from rotor.quantum.internal_rotation.contracted import Product
-from rotor.quantum.internal_rotation.exchange import SpinCounts
+from rotor.quantum.internal_rotation.exchange import exchanged_functions
 from rotor.quantum.internal_rotation.expectations import Expectations
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
@@ -289,11 +289,8 @@ class Degeneracies:
 
     def columns(self, species: str, functions: TorsionRotation, rows: Ints) -> Columns:
         """Species, components and weight of the levels at `rows` of the functions."""
-        fixed: Columns = {
-            "species": np.full(len(rows), species),
-            "components": np.full(len(rows), self.components(species)),
-        }
-        return fixed | {"weight": self.weights(species, functions, rows)}
+        components, weight = np.full(len(rows), self.components(species)), self.weights(species, functions, rows)
+        return {"species": np.full(len(rows), species), "components": components, "weight": weight}
 
     def components(self, species: str) -> int:
         """States that coincide: σ and -σ, except for A, AA and AAA; for equivalent tops also AE and EA."""
@@ -306,19 +303,17 @@ class Degeneracies:
         """
         names = sigma_species(self.constants.tops)
         if self.equivalent:
-            counts = SpinCounts(self.constants.states_of_tops[0], self.constants.exchanged)
-            signs = np.array([1, -1])
-            divisor = np.gcd.reduce(
-                np.concatenate([counts.functions_of_species(sigma, signs) for sigma in sigma_species(2).values()])
-            )
-            x = functions.labels.get("x", np.ones(len(functions.labels["J"]), dtype=np.int64))
-            return np.asarray(counts.functions_of_species(names[species], x[rows]) // divisor)
-        weights = {
-            name: (1 + any(sigma))
-            * math.prod(top[abs(s)] for top, s in zip(self.constants.weights, sigma, strict=True))
-            for name, sigma in names.items()
-        }
-        return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
+            states, pairs = self.constants.states_of_tops[0], self.constants.exchanged
+            weights = {name: exchanged_functions(states, pairs, sigma) for name, sigma in names.items()}
+        else:
+            tops = self.constants.weights
+            weights = {
+                name: np.full(2, (1 + any(sigma)) * math.prod(top[abs(s)] for top, s in zip(tops, sigma, strict=True)))
+                for name, sigma in names.items()
+            }
+        x = functions.labels.get("x", np.ones(len(functions.labels["J"]), dtype=np.int64))
+        divisor = np.gcd.reduce(np.concatenate([*weights.values()]))
+        return np.asarray(weights[species][(x[rows] < 0).astype(int)] // divisor)
 
 
 def species_rotors(moments: TorsionMoments, components: int) -> list[SolvedBlock]:

@@ -12,7 +12,7 @@ import rotor
 from rotor import units
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.molecules.molecule_writer import write_molecule_file
-from rotor.quantum.internal_rotation.exchange import SpinCounts
+from rotor.quantum.internal_rotation.exchange import exchanged_functions
 from rotor.quantum.internal_rotation.several_tops import several_tops
 
 CM = units.MHZ_PER_CM
@@ -92,18 +92,17 @@ CASES = [
 @pytest.mark.parametrize(("sigma", "n", "pairs"), CASES)
 @pytest.mark.parametrize("x", [1, -1])
 def test_spin_weights_are_those_of_permuted_spins(sigma, x, n, pairs):
-    counted = SpinCounts(n, pairs).functions_of_species(sigma, np.array([x]))
-    assert counted.tolist() == [allowed_functions(sigma, x, n, pairs)]
+    counted = exchanged_functions(n, pairs, sigma)[[1, -1].index(x)]
+    assert counted == allowed_functions(sigma, x, n, pairs)
 
 
 @pytest.mark.parametrize("n", [2, 3])
 def test_weights_sum_to_all_spin_functions(n):
     """Σ over C3 ≀ C2 of (spin functions of a species) times its dimension over its copies is n⁶."""
-    counts, both = SpinCounts(n), np.array([1, -1])
-    total = counts.functions_of_species((0, 0), both).sum() + counts.functions_of_species((1, 1), both).sum()
-    total += 2 * counts.functions_of_species((1, -1), both)[0] + 2 * counts.functions_of_species((0, 1), both)[0]
+    counts = {sigma: exchanged_functions(n, (), sigma) for sigma in ((0, 0), (1, 1), (1, -1), (0, 1))}
+    total = counts[0, 0].sum() + counts[1, 1].sum() + 2 * counts[1, -1][0] + 2 * counts[0, 1][0]
     assert total == n**6
-    assert counts.functions_of_species((0, 0), both).tolist() == ([6, 10] if n == 2 else [66, 55])
+    assert counts[0, 0].tolist() == ([6, 10] if n == 2 else [66, 55])
 
 
 # Levels
