@@ -604,6 +604,19 @@ def test_a_forgotten_unit_is_named(call):
     assert "no unit" not in call("spectrum", "OCS", "--range", "2:3GHz")[1]
 
 
+def test_what_a_unit_that_is_not_last_means_is_said(call):
+    """Only a unit at the end serves the constants without one; --help, a note and the error on the order say so."""
+    rule = "only a unit at the end serves the constants without one"
+    code, _, err = call("info", "--constants", "A=9 GHz B=3 C=2")
+    assert (code, f"note: --constants: GHz is the unit of A alone, and B, C are in MHz: {rule}" in err) == (0, True)
+    code, _, err = call("info", "--constants", "A=9 B=3 C=2 GHz DeltaJ=1 kHz")
+    assert code == 2
+    assert f"exchange them; GHz is the unit of C alone, and A, B are in kHz: {rule}" in err
+    code, _, err = call("info", "--constants", "A=9 GHz B=4 GHz C=3 GHz")
+    assert (code, rule in err) == (0, False)
+    assert "only a unit at the end serves all" in " ".join(call("info", "--help")[1].split())
+
+
 def test_a_smiles_without_its_prefix_is_recognized(call):
     code, _, err = call("spectrum", "C=O")
     assert (code, err) == (2, "error: 'C=O' is no file and no name of a molecule; did you mean 'SMILES:C=O'?\n")

@@ -54,6 +54,32 @@ def parse_named(text: str) -> tuple[dict[str, float], dict[str, float]]:
     return values, uncertainties
 
 
+def mixed_units(text: str) -> str:
+    """Which constants have which unit, for a text with units at some constants before the last; "" for other texts.
+
+    >>> mixed_units("A=9 GHz B=3 C=2")
+    'GHz is the unit of A alone, and B, C are in MHz: only a unit at the end serves the constants without one'
+    >>> mixed_units("A=9 B=3 C=2 GHz DeltaJ=1 kHz")
+    'GHz is the unit of C alone, and A, B are in kHz: only a unit at the end serves the constants without one'
+    >>> mixed_units("A=9 B=3 C=2 GHz")
+    ''
+    """
+    items = _items(text)
+    last = items[-1]["unit"] or "MHz"
+    without = [item["name"] for item in items if not item["unit"]]
+    others = {item["name"]: item["unit"] for item in items if item["unit"] not in (None, last)}
+    if not others or not without:
+        return ""
+    alone = ", ".join(
+        f"{unit} is the unit of {', '.join(name for name in others if others[name] == unit)} alone"
+        for unit in dict.fromkeys(others.values())
+    )
+    verb = "is" if len(without) == 1 else "are"
+    return (
+        f"{alone}, and {', '.join(without)} {verb} in {last}: only a unit at the end serves the constants without one"
+    )
+
+
 def _items(text: str) -> list[re.Match[str]]:
     """The items name=number(digits)unit of a text; anything else but spaces, commas and semicolons is an error."""
     text = text.replace("−", "-")

@@ -61,7 +61,8 @@ class MoleculeInput:
         example="water",
     )
     constants: str | None = declared(
-        None, Text(), 'Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz)', "molecule.constants",
+        None, Text(), 'Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz); only a unit at the end serves all',
+        "molecule.constants",
         common=True, example="A=9.2 B=3 C=2.5 GHz",
     )  # fmt: skip
     isotopes: tuple[str, ...] = declared(
@@ -227,6 +228,8 @@ def _refuse_contradictions(reading: Reading) -> None:
 
 
 def _from_constants(reading: Reading) -> Top:
+    from rotor.tops.constants.constants import AxisOrderError
+    from rotor.tops.constants.uncertain_numbers import mixed_units
     from rotor.tops.top import Top
 
     text = reading.inputs.constants or ""
@@ -234,7 +237,12 @@ def _from_constants(reading: Reading) -> Top:
         if bracketed := re.search(r"(\w[\w-]*[(\[][^()\[\]=]*[)\]](?:\[\d+\])?)\s*=", text):
             other = "spin_constants" if "(" in bracketed[1] else "state_constants"
             raise ValueError(f"{bracketed[1]} is not a rotational constant; give it with {reading.named(other)}")
-        top = Top.from_constants(text, source=reading.source("constants"))
+        try:
+            top = Top.from_constants(text, source=reading.source("constants"))
+        except AxisOrderError as error:
+            raise ValueError("; ".join(filter(None, (str(error), mixed_units(text))))) from None
+    if mixed := mixed_units(text):
+        reading.note(f"{reading.named('constants')}: {mixed}")
     if reading.style == "option" and not has_unit(text) and max(top.constants.values.values()) < USUAL_LEAST_MHZ:
         reading.note(
             f"{reading.named('constants')}: no unit is given: the numbers are taken as MHz; for GHz write '{text} GHz'"
