@@ -19,13 +19,12 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rotor.classical.euler import gyroscopic_term
 from rotor.classical.free.free_motion import free_motion
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, integrate
 from rotor.classical.integrators.moser_veselov import MoserVeselov
 from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting
-from rotor.geometry.quaternions import product
+from rotor.geometry.quaternions import cross, product
 from rotor.geometry.rotations import IDENTITY, distance
 
 MOMENTS, MOMENTUM, PERIODS = np.array([1.0, 1.875, 2.875]), np.array([0.5, 0.75, 1.0]), 1000
@@ -40,7 +39,7 @@ def scipy_motion(tolerance: float, span: float) -> np.ndarray:
         m1, m2, m3, w, x, y_, z = y.tolist()
         w1, w2, w3 = m1 / MOMENTS[0], m2 / MOMENTS[1], m3 / MOMENTS[2]
         turning = product((w, x, y_, z), (0.0, w1, w2, w3))
-        return [*gyroscopic_term((m1, m2, m3), (w1, w2, w3)), *(0.5 * part for part in turning)]
+        return [*cross((m1, m2, m3), (w1, w2, w3)), *(0.5 * part for part in turning)]
 
     start = [*MOMENTUM, *IDENTITY]
     return solve_ivp(rates, (0.0, span), start, "DOP853", t_eval=[span], rtol=tolerance, atol=tolerance).y[3:, -1]

@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rotor.classical.euler import gyroscopic_term
 from rotor.classical.free.free_motion import free_motion
-from rotor.geometry.quaternions import product
+from rotor.geometry.quaternions import cross, product
 from rotor.geometry.rotations import IDENTITY
 
 BODIES = {
@@ -70,7 +69,7 @@ def stepped_period() -> None:
     def rates(_: float, y: np.ndarray) -> np.ndarray:
         momentum, omega = y[:3], y[:3] / moments
         turning = product(y[3:], (0.0, *omega))
-        return np.array([*gyroscopic_term(momentum, omega), *(0.5 * rate for rate in turning)])
+        return np.array([*cross(momentum, omega), *(0.5 * rate for rate in turning)])
 
     start = np.concatenate([momentum, IDENTITY])
     solve_ivp(rates, (0.0, 20.6947551192268), start, method="DOP853", rtol=1e-12, atol=1e-12)

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,6 +45,18 @@ def writable(array: Any) -> Floats:
     """The array in C order, copied only if it is not writable: compiled loops have one signature more for each kind of array."""
     rows = np.ascontiguousarray(array, dtype=np.float64)
     return rows if rows.flags.writeable else rows.copy()
+
+
+def with_components(values: ArrayLike, count: int, what: str) -> Floats:
+    """Values as an array (..., count); a ValueError that begins with `what` for any other shape.
+
+    >>> with_components([1, 2, 3], 3, "vectors")
+    array([1., 2., 3.])
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != count:
+        raise ValueError(f"{what} have shape (..., {count}); got shape {array.shape}")
+    return array
 
 
 def distinct(values: NDArray[Any]) -> NDArray[Any]:

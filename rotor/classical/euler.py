@@ -14,15 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, with_components
 from rotor.geometry.inertia import kinetic_energy_by_axis
-from rotor.geometry.quaternions import cross
-from rotor.geometry.rotations import multiply, rotate
+from rotor.geometry.rotations import multiply, rotate, vector_product
 
 LINEAR_MISMATCH = 1e-12  # relative difference of the two moments of a linear rotor: round-off
 
@@ -39,24 +37,13 @@ class Invariants:
     space_momentum: Floats
 
 
-def gyroscopic_term(momentum: Any, omega: Any) -> Any:
-    """L x ω by components, three floats or arrays each: dL/dt in the body without torque.
-
-    >>> gyroscopic_term((0.0, 2.0, 3.0), (0.0, 1.0, 1.0))
-    (-1.0, 0.0, 0.0)
-    """
-    return cross(momentum, omega)
-
-
 def gyroscopic_rate(momentum: Floats, omega: Floats) -> Floats:
     """L x ω of arrays (..., 3): the right-hand side of Euler's equations without torque.
 
     >>> gyroscopic_rate(np.array([0.0, 2.0, 3.0]), np.array([0.0, 1.0, 1.0])).tolist()
     [-1.0, 0.0, 0.0]
     """
-    m1, m2, m3 = momentum[..., 0], momentum[..., 1], momentum[..., 2]
-    w1, w2, w3 = omega[..., 0], omega[..., 1], omega[..., 2]
-    return np.stack(gyroscopic_term((m1, m2, m3), (w1, w2, w3)), axis=-1)
+    return vector_product(momentum, omega)
 
 
 def kinetic_energy(momentum: Floats, omega: Floats) -> Floats:
@@ -74,9 +61,7 @@ def checked_moments(moments: ArrayLike) -> Floats:
     >>> checked_moments([0.0, 2.0, 2.0])
     array([0., 2., 2.])
     """
-    array = np.asarray(moments, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"principal moments have shape (..., 3); got shape {array.shape}")
+    array = with_components(moments, 3, "principal moments")
     if not np.all(np.isfinite(array)) or np.any(array < 0.0):
         raise ValueError(f"principal moments must be finite and not negative; got {array.tolist()}")
     if np.any(np.sum(array == 0.0, axis=-1) > 1):
@@ -106,9 +91,7 @@ def checked_velocity(omega: ArrayLike, moments: Floats) -> Floats:
 
 def _checked_vector(vector: ArrayLike, moments: Floats, plural: str, singular: str, about_axis: str) -> Floats:
     """A vector (..., 3), finite, with nothing along an axis whose moment is zero; the texts name it in errors."""
-    array = np.asarray(vector, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"{plural} have shape (..., 3); got shape {array.shape}")
+    array = with_components(vector, 3, plural)
     if not np.all(np.isfinite(array)):
         raise ValueError(f"{singular} holds a number that is not finite")
     if np.any((moments == 0.0) & (array != 0.0)):

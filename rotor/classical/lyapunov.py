@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +41,10 @@ class Flow:
     start: Floats
     jacobian: Callable[[float, Floats], Floats] | None = None
     timed: bool = False
+
+    def state_rate(self, time: float, y: Floats) -> Floats:
+        """The rate (d,) of a single state."""
+        return self.rate(time, y[None])[0]
 
     def slopes(self, time: float, y: Floats) -> Floats:
         """The Jacobian ∂rate_i/∂y_j at states (k, d)."""
@@ -210,21 +215,9 @@ def orbit(flow: Flow, times: ArrayLike, tolerance: float = 1e-10) -> Floats:
     >>> orbit(decay, [0.0, 1.0])[:, 0].round(8).tolist()
     [1.0, 0.36787944]
     """
-    from scipy.integrate import solve_ivp
-
     times = np.asarray(times, dtype=np.float64)
-    solution = solve_ivp(
-        lambda t, y: flow.rate(t, y[None])[0],
-        # an interval of 0 is refused by solve_ivp
-        (0.0, max(float(times[-1]), np.finfo(float).tiny)),
-        flow.start,
-        method="DOP853",
-        t_eval=times,
-        rtol=tolerance,
-        atol=tolerance,
-    )
-    _check_success(solution)
-    return np.asarray(solution.y.T)
+    end = max(float(times[-1]), np.finfo(float).tiny)  # an interval of 0 is refused by solve_ivp
+    return np.asarray(_solution(flow.state_rate, (0.0, end), flow.start, tolerance, t_eval=times).y.T)
 
 
 def poincare_section(
@@ -258,22 +251,12 @@ def poincare_section(
     >>> (times / np.pi).round(6).tolist(), states[:, 1].round(6).tolist()
     ([1.5, 3.5], [1.0, 1.0])
     """
-    from scipy.integrate import solve_ivp
 
     def crossing(t: float, y: Floats) -> float:
         return surface(t, y)
 
     crossing.direction = 1.0  # type: ignore[attr-defined]
-    solution = solve_ivp(
-        lambda t, y: flow.rate(t, y[None])[0],
-        (0.0, time),
-        flow.start,
-        method="DOP853",
-        events=crossing,
-        rtol=tolerance,
-        atol=tolerance,
-    )
-    _check_success(solution)
+    solution = _solution(flow.state_rate, (0.0, time), flow.start, tolerance, events=crossing)
     times, states = solution.t_events[0], np.reshape(solution.y_events[0], (-1, flow.start.size))
     return times[times >= transient], states[times >= transient]
 
@@ -378,8 +361,6 @@ class _Tracker:
     def _interval(
         self, clock: float, states: Floats, tangent: Floats, length: float
     ) -> tuple[Floats, Floats, Floats, int]:
-        from scipy.integrate import solve_ivp
-
         (k, d), m = states.shape, tangent.shape[2]
 
         def rates(time: float, flat: Floats) -> Floats:
@@ -389,16 +370,7 @@ class _Tracker:
             return np.concatenate([rate.reshape(-1), (slopes @ v).reshape(-1), traces])
 
         start = np.concatenate([states.reshape(-1), tangent.reshape(-1), np.zeros(k)])
-        solution = solve_ivp(
-            rates,
-            (clock, clock + length),
-            start,
-            method="DOP853",
-            t_eval=[clock + length],
-            rtol=self.tolerance,
-            atol=self.tolerance,
-        )
-        _check_success(solution)
+        solution = _solution(rates, (clock, clock + length), start, self.tolerance, t_eval=[clock + length])
         end = solution.y[:, -1]
         return end[: k * d].reshape(k, d), end[k * d : -k].reshape(k, d, m), end[-k:], solution.nfev // STAGES
 
@@ -413,7 +385,13 @@ class _Tracker:
         )
 
 
-def _check_success(solution: object) -> None:
-    """Refuse an orbit that could not be followed to its end."""
-    if getattr(solution, "status", -1) < 0:
-        raise ValueError(f"the orbit could not be followed: {getattr(solution, 'message', '')}")
+def _solution(
+    rate: Callable[[float, Floats], Floats], span: tuple[float, float], start: Floats, tolerance: float, **options: Any
+) -> Any:
+    """The solution of DOP853 (`solve_ivp`); ValueError for an orbit that could not be followed to its end."""
+    from scipy.integrate import solve_ivp
+
+    solution = solve_ivp(rate, span, start, method="DOP853", rtol=tolerance, atol=tolerance, **options)
+    if solution.status < 0:
+        raise ValueError(f"the orbit could not be followed: {solution.message}")
+    return solution

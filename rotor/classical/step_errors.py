@@ -99,22 +99,10 @@ def driven_budget(motion: Motion, truncation: ErrorTerm) -> ErrorBudget:
 def step_truncation(
     motion: Motion, compiled: bool, tolerance: float | None, at: Callable[[float], Motion]
 ) -> ErrorTerm:
-    """The error of the steps.
+    """The error of the steps; not estimated if the motion is too long to be repeated.
 
-    Parameters
-    ----------
-    motion : Motion
-    compiled : bool
-        Whether its steps are compiled: then longer motions are repeated.
-    tolerance : float or None
-        Tolerance of a step; None for fixed steps.
-    at : callable
-        The motion for another tolerance, or with the fixed step divided by a number.
-
-    Returns
-    -------
-    ErrorTerm
-        Not estimated if the motion is too long to be repeated.
+    compiled: longer motions of compiled steps are repeated. tolerance: of a step; None for fixed steps. at: the motion for another
+    tolerance, or with the fixed step divided by a number.
     """
     if motion.steps > (MOST_STEPS if compiled else MOST_CALLED):
         return ErrorTerm(None, f"{motion.steps} steps are not made a second time", OF_REMEDY)

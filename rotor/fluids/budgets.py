@@ -27,24 +27,7 @@ if TYPE_CHECKING:
 def temperature_budget(
     record: FluidRecord, settings: Settings, degrees: float, bodies: int, averages: Sequence[Mean]
 ) -> ErrorBudget:
-    """The errors of the mean temperature of a run in K.
-
-    Parameters
-    ----------
-    record : FluidRecord
-    settings : Settings
-        Step and potential of the run.
-    degrees : float
-        Degrees of freedom of the box.
-    bodies : int
-        Molecules of the box.
-    averages : sequence of Mean
-        Means of the run, including the temperature.
-
-    Returns
-    -------
-    ErrorBudget
-    """
+    """The errors of the mean temperature of a run in K; degrees: of freedom of the box; averages: include the temperature."""
     temperature = next(mean for mean in averages if mean.quantity == "temperature")
     return ErrorBudget(
         of="temperature",

@@ -63,13 +63,10 @@ class TextFile:
         self._file.close()
 
 
-class ExtendedXyz:
+class ExtendedXyz(TextFile):
     """Frames as extended xyz: elements, positions, momenta, time and potential energy."""
 
-    def __init__(self, path: str | os.PathLike[str], length: int | None = None) -> None:
-        self._file = TextFile(path, length)
-
-    def add(self, atoms: Atoms, time_ps: float) -> None:
+    def add_frame(self, atoms: Atoms, time_ps: float) -> None:
         """Append a frame."""
         from ase.io.extxyz import write_extxyz
 
@@ -78,15 +75,7 @@ class ExtendedXyz:
         columns = ["symbols", "positions", "momenta", *(["molecule"] if "molecule" in frame.arrays else [])]
         text = io.StringIO()
         write_extxyz(text, [frame], columns=columns)
-        self._file.add(text.getvalue())
-
-    def sync(self) -> int:
-        """Bytes, all on the disk."""
-        return self._file.sync()
-
-    def close(self) -> None:
-        """Let go of it."""
-        self._file.close()
+        self.add(text.getvalue())
 
 
 class AseTrajectory:
@@ -112,7 +101,7 @@ class AseTrajectory:
             ) from error
         os.replace(beside, self.path)
 
-    def add(self, atoms: Atoms, time_ps: float) -> None:
+    def add_frame(self, atoms: Atoms, time_ps: float) -> None:
         """Append a frame."""
         from ase.io.trajectory import Trajectory
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.fluids.forces.assembly import kinds_by_symbols
 from rotor.fluids.forces.models import RigidModel
 from rotor.fluids.motion.bodies import Bodies
 from rotor.geometry import rotations
@@ -76,26 +77,13 @@ def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np
 def model_labels(atoms: Atoms, models: Sequence[RigidModel]) -> NDArray[np.int64]:
     """Molecule labels of the atoms of a box with consecutive molecules in the atom order of the models.
 
-    The longest matching model is used; ValueError if none matches.
-
     >>> from ase import Atoms
     >>> from rotor.fluids.forces.models import find_model
     >>> model_labels(Atoms("OH2OH2", positions=np.zeros((6, 3))), [find_model("spce")]).tolist()
     [0, 0, 0, 1, 1, 1]
     """
-    symbols = tuple(atoms.get_chemical_symbols())
-    ordered = sorted((model.symbols for model in models), key=len, reverse=True)
-    labels, at, number = np.zeros(len(symbols), dtype=np.int64), 0, 0
-    while at < len(symbols):
-        fits = next((elements for elements in ordered if symbols[at : at + len(elements)] == elements), None)
-        if fits is None:
-            expected = " or ".join(" ".join(elements) for elements in ordered)
-            raise ValueError(
-                f"atom {at} ({symbols[at]}) does not begin a molecule of the models: expected {expected}, in this order"
-            )
-        labels[at : at + len(fits)] = number
-        at, number = at + len(fits), number + 1
-    return labels
+    kinds = kinds_by_symbols(atoms.get_chemical_symbols(), models)
+    return np.repeat(np.arange(len(kinds)), [len(models[kind].symbols) for kind in kinds])
 
 
 def check_apart(atoms: Atoms, bodies: Bodies) -> None:
@@ -184,21 +172,7 @@ def at_rest(bodies: Bodies, momentum: Floats) -> Floats:
 
 
 def heat(atoms: Atoms, bodies: Bodies, attitude: Floats, temperature_k: float, rng: np.random.Generator) -> None:
-    """Give the atoms thermal momenta of rigid molecules, the total momentum removed, in place.
-
-    Parameters
-    ----------
-    atoms : ase.Atoms
-        Whose momenta are set.
-    bodies : Bodies
-        Its molecules.
-    attitude : (n, 4) array
-        Of the bodies.
-    temperature_k : float
-        Temperature.
-    rng : numpy.random.Generator
-        Source of the random numbers.
-    """
+    """Give the atoms thermal momenta of rigid molecules, the total momentum removed, in place; attitude: (n, 4), of the bodies."""
     momentum, angular = thermal_momenta(bodies, temperature_k, rng, removed=3)
     atoms.set_masses(bodies.masses)
     atoms.set_momenta(bodies.momenta(momentum, angular, attitude))

@@ -89,13 +89,7 @@ def reference_axes(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | Non
 def motion_means(frames: MotionFrames, interval_ps: float, axes: Floats | None) -> tuple[list[Mean], str]:
     """τ1, τ2 and D of a run with standard errors, or the reason why they are missing.
 
-    Parameters
-    ----------
-    frames : MotionFrames
-    interval_ps : float
-        Time between rows of the run.
-    axes : (n, 3) array or None
-        The axes of all molecules in body axes; None if a molecule has none.
+    interval_ps: between rows of the run. axes: (n, 3) of all molecules in body axes; None if a molecule has none.
     """
     step = interval_ps * frames.stride
     length = (len(frames.centres) - 1) * step

@@ -12,7 +12,7 @@ import hashlib
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
@@ -166,8 +166,7 @@ def bodies_and_degrees(atoms: Atoms, settings: Settings) -> tuple[Bodies, Degree
     from rotor.fluids.motion.bodies import rigid_bodies
 
     bodies, _ = rigid_bodies(atoms, shapes=model_shapes(find_models(settings.model)))
-    removed = 0 if settings.ensemble == "langevin" else 3
-    return bodies, bodies.degrees(removed), "mixed" if settings.ensemble == "nve" else "half"
+    return bodies, bodies.degrees(settings.removed_degrees), "mixed" if settings.ensemble == "nve" else "half"
 
 
 def make_thermostat(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
@@ -233,15 +232,8 @@ class _Run:
     @contextmanager
     def files(self) -> Iterator[None]:
         """Open the growing files, new or at the lengths of the checkpoint."""
-        outputs, lengths = self.outputs, self._lengths
-        with ExitStack() as open_files:
-            for path in outputs.trajectories:
-                file = trajectory_file(path, lengths.get(str(path)))
-                self._frames.append(open_files.enter_context(closing(file)))
-            if outputs.csv is not None:
-                self._csv = open_files.enter_context(closing(TextFile(outputs.csv, lengths.get("csv"))))
-                if lengths.get("csv") is None:
-                    self._csv.add(",".join(COLUMNS) + "\n")
+        with ExitStack() as stack:
+            self._csv, self._frames = open_outputs(stack, self.outputs, self._lengths)
             yield
 
     def go(self, progress: Progress) -> None:
@@ -320,7 +312,7 @@ class _Run:
                 self._motion.add(dynamics.state.centres, dynamics.state.attitude)
         if dynamics.nsteps % (self.outputs.frames_every or steps_per_row) == 0:
             for file in self._frames:
-                file.add(dynamics.atoms, time_ps)
+                file.add_frame(dynamics.atoms, time_ps)
 
     def _row(self, time_ps: float) -> list[float]:
         dynamics = self.dynamics
@@ -372,6 +364,21 @@ class _Run:
         if self._saved_at is None or self.outputs.checkpoint is None:
             return ""
         return f"; {self.outputs.checkpoint} is of step {self._saved_at}, resume from it"
+
+
+def open_outputs(
+    stack: ExitStack, outputs: Outputs, lengths: Mapping[str, int]
+) -> tuple[TextFile | None, list[ExtendedXyz | AseTrajectory]]:
+    """The growing table and trajectories, closed with the stack; new, or continued at the lengths of a checkpoint."""
+    trajectories = [
+        stack.enter_context(closing(trajectory_file(path, lengths.get(str(path))))) for path in outputs.trajectories
+    ]
+    if outputs.csv is None:
+        return None, trajectories
+    csv = stack.enter_context(closing(TextFile(outputs.csv, lengths.get("csv"))))
+    if "csv" not in lengths:
+        csv.add(",".join(COLUMNS) + "\n")
+    return csv, trajectories
 
 
 def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:

@@ -85,3 +85,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @property
+    def removed_degrees(self) -> int:
+        """Degrees of freedom of the total momentum, which only langevin changes."""
+        return 0 if self.ensemble == "langevin" else 3

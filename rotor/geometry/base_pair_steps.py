@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, with_components
 from rotor.geometry.rotations import conjugate, exp, multiply, rotate, to_matrix
 
 NODES = 5  # Gauss-Hermite points per angle: exact for polynomials of degree 9 in the angles
@@ -29,7 +29,7 @@ def step_pose(parameters: ArrayLike) -> tuple[Floats, Floats]:
     >>> position.tolist(), float((2 * np.degrees(np.arccos(q[0]))).round(12))
     ([0.0, 0.0, 3.4], 36.0)
     """
-    values = _six(parameters)
+    values = with_components(parameters, 6, "shift, slide, rise, tilt, roll, twist of base-pair steps")
     bend, half_twist = np.radians(values[..., 3:5]), 0.5 * np.radians(values[..., 5])
     flat = np.concatenate([bend, np.zeros_like(bend[..., :1])], axis=-1)
     upright = np.stack([np.zeros_like(half_twist), np.zeros_like(half_twist), half_twist], axis=-1)
@@ -90,12 +90,3 @@ def persistence_steps(rotation: ArrayLike) -> float:
     if not 0.0 < largest < 1.0:
         raise ValueError(f"a chain of constant steps has no persistence length: the largest eigenvalue is {largest:g}")
     return -1.0 / math.log(largest)
-
-
-def _six(parameters: ArrayLike) -> Floats:
-    array = np.asarray(parameters, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 6:
-        raise ValueError(
-            f"parameters of base-pair steps have shape (..., 6): shift, slide, rise, tilt, roll, twist; got {array.shape}"
-        )
-    return array

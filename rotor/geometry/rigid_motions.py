@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, with_components
 from rotor.geometry.rotations import exp, log, multiply, rotate, to_matrix
 
 SERIES_BELOW = 1.0  # rad: below it the coefficients of exp and log are summed as series to avoid cancellation
@@ -164,17 +164,11 @@ def bracket(first: ArrayLike, second: ArrayLike) -> Floats:
 
 
 def _six(array: ArrayLike) -> Floats:
-    array = np.asarray(array, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 6:
-        raise ValueError(f"twists and wrenches have shape (..., 6), the rotational half first; got {array.shape}")
-    return array
+    return with_components(array, 6, "twists and wrenches, the rotational half first,")
 
 
 def _three(array: ArrayLike) -> Floats:
-    array = np.asarray(array, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"positions have shape (..., 3); got {array.shape}")
-    return array
+    return with_components(array, 3, "positions")
 
 
 def _hat(v: Floats) -> Floats:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, with_components
 from rotor.geometry import quaternions
 
 IDENTITY: Floats = np.array([1.0, 0.0, 0.0, 0.0])
@@ -268,17 +268,11 @@ def from_scalar_last(q: ArrayLike) -> Floats:
 
 
 def _components(q: ArrayLike) -> Floats:
-    array = np.asarray(q, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 4:
-        raise ValueError(f"quaternions have shape (..., 4), scalar first; got shape {array.shape}")
-    return array
+    return with_components(q, 4, "quaternions, scalar first,")
 
 
 def _vectors(v: ArrayLike) -> Floats:
-    array = np.asarray(v, dtype=np.float64)
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"vectors have shape (..., 3); got shape {array.shape}")
-    return array
+    return with_components(v, 3, "vectors")
 
 
 def _matrices(m: ArrayLike) -> Floats:

@@ -124,7 +124,7 @@ DRAG = ("--effect", "linear drag coefficients=1,1,1")
         ((*BODY, "--effect", "drag coefficients=1,1,1", "--times", "0:1:3"), "no effect is named 'drag'; the nearest is 'linear drag'"),
         ((*BODY, "--effect", "linear drag coefs=1,1,1", "--times", "0:1:3"), "linear drag has no 'coefs'; the nearest is 'coefficients'"),
         ((*BODY, "--effect", "linear drag", "--times", "0:1:3"), "coefficients is missing; give coefficients (diagonal (3,)"),
-        ((*BODY, "--effect", "linear drag coefficients=1,1", "--times", "0:1:3"), "--effect: linear drag has 3 coefficients"),
+        ((*BODY, "--effect", "linear drag coefficients=1,1", "--times", "0:1:3"), "--effect: linear drag: expected 3 numbers"),
         ((*BODY, "--effect", "linear drag coefficients=1,a", "--times", "0:1:3"), "coefficients=1,a: expected numbers"),
         ((*BODY, "--effect", "linear drag coefficients=1 coefficients=2", "--times", "0:1:3"), "expected each parameter once"),
         ((*BODY, *DRAG), "--times: expected with --effect, the start first: such as 0:10:101"),

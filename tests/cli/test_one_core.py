@@ -19,7 +19,7 @@ PAGE = PROJECT / "docs" / "validation" / "classical_core.md"
 # (file, what stands there, what is put in its place): each text stands there once
 BREAKS = {
     "right-hand side": [
-        ("classical/euler.py", "return cross(momentum, omega)", "return cross(tuple(1.001 * m for m in momentum), omega)"),
+        ("classical/euler.py", "return vector_product(momentum, omega)", "return vector_product(1.001 * momentum, omega)"),
     ],
     "free flow": [
         ("classical/free/_kernels.py", "half_turn = 2.0 * math.pi * turn", "half_turn = 2.002 * math.pi * turn"),

@@ -32,7 +32,7 @@ WRONG = {
     "a field of no molecule": (STARK + '[conditions]\nfield = "0:1e12kV/cm:3"', "conditions.field: a field of 1e+12 kV/cm"),
     "an M above J": (STARK + "[observables]\nm = [7]\n[conditions]\nfield = [1.0]", "observables.m: [7.0]: expected numbers from 0"),
     "an effect that is none": (BODY + DRAG.replace("drag", "drg"), "effects[0].effect: 'linear drg' is none; the nearest is"),
-    "two coefficients of three": (BODY + DRAG.replace("0.1, 0.1,", "0.1,") + TIMES, "effects[0]: linear drag has 3 coefficients"),
+    "two coefficients of three": (BODY + DRAG.replace("0.1, 0.1,", "0.1,") + TIMES, "effects[0]: linear drag: expected 3 numbers"),
     "effects without times": (BODY + DRAG, "conditions.times: expected with effects"),
     "a film of a driven body": (BODY + DRAG + TIMES + '[outputs]\ngif = "a.gif"', "outputs.gif: needs a free motion (a table shows any); "
         "expected without effects"),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque, matrix_field, vector_field
-from rotor.classical.effects.torques import checked_vector, from_body, lever_torque
+from rotor.classical.effects.torques import checked_matrix, checked_vector, from_body, lever_torque
 from rotor.classical.torque_form import INDUCED, LEVER, TorqueForm, torque_form
 
 
@@ -66,15 +66,9 @@ class InducedDipole(Torque):
     field: ArrayLike = vector_field("field", "in space")
 
     def __post_init__(self) -> None:
-        array = np.array(self.polarizability, dtype=np.float64)
-        matrix = np.diag(array) if array.shape == (3,) else array
-        if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or not np.array_equal(matrix, matrix.T):
-            raise ValueError(
-                f"a polarizability: expected 3 numbers or a symmetric, finite 3x3 matrix; got {np.asarray(array).tolist()}; "
-                "for a nearly symmetric one give (α + αᵀ)/2"
-            )
-        matrix.setflags(write=False)
-        object.__setattr__(self, "polarizability", matrix)
+        object.__setattr__(
+            self, "polarizability", checked_matrix(self.polarizability, "a polarizability", symmetric=True)
+        )
         object.__setattr__(self, "field", checked_vector(self.field, "a field"))
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
@@ -112,7 +106,9 @@ class PulsedPolarizability(Torque):
     history: Callable[[float], float]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "polarizability", InducedDipole(self.polarizability, [0, 0, 1.0]).polarizability)
+        object.__setattr__(
+            self, "polarizability", checked_matrix(self.polarizability, "a polarizability", symmetric=True)
+        )
         light = np.array(self.light, dtype=np.float64)
         if light.shape != (3, 3) or not np.all(np.isfinite(light)) or not np.array_equal(light, light.T):
             raise ValueError(f"the tensor of light is a symmetric finite 3x3 matrix; got {light.tolist()}")

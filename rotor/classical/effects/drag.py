@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque, matrix_field, vector_field
+from rotor.classical.effects.torques import checked_matrix, checked_vector
 from rotor.classical.torque_form import LINEAR, QUADRATIC, TorqueForm, torque_form
 
 
@@ -31,12 +32,7 @@ class LinearDrag(Torque):
     coefficients: ArrayLike = matrix_field("coefficients", "diagonal (3,) or matrix (3, 3)")
 
     def __post_init__(self) -> None:
-        array = np.array(self.coefficients, dtype=np.float64)
-        matrix = np.diag(array) if array.shape == (3,) else array
-        if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
-            raise ValueError(f"linear drag has 3 coefficients or a finite 3x3 matrix; got shape {array.shape}")
-        matrix.setflags(write=False)
-        object.__setattr__(self, "coefficients", matrix)
+        object.__setattr__(self, "coefficients", checked_matrix(self.coefficients, "linear drag"))
 
     @property
     def needs_attitude(self) -> bool:
@@ -66,11 +62,10 @@ class QuadraticDrag(Torque):
     coefficients: ArrayLike = vector_field("coefficients", "three, not negative")
 
     def __post_init__(self) -> None:
-        array = np.array(self.coefficients, dtype=np.float64)
-        if array.shape != (3,) or not np.all(np.isfinite(array)) or np.any(array < 0.0):
-            raise ValueError(f"quadratic drag has 3 coefficients, finite and not negative; got {array.tolist()}")
-        array.setflags(write=False)
-        object.__setattr__(self, "coefficients", array)
+        coefficients = checked_vector(self.coefficients, "quadratic drag")
+        if np.any(coefficients < 0.0):
+            raise ValueError(f"coefficients of quadratic drag are not negative; got {coefficients.tolist()}")
+        object.__setattr__(self, "coefficients", coefficients)
 
     @property
     def needs_attitude(self) -> bool:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import Torque, frame_field, number_field, vector_field
-from rotor.classical.effects.torques import Frame, checked_frame, checked_vector, fixed_form, in_body
+from rotor.classical.effect import frame_field, number_field, vector_field
+from rotor.classical.effects.torques import Frame, FramedTorque, checked_frame, checked_vector, fixed_form, in_body
 from rotor.classical.torque_form import TorqueForm
 
 
 @dataclass(frozen=True)
-class PeriodicDrive(Torque):
+class PeriodicDrive(FramedTorque):
     """Torque amplitude cos(angular_frequency time + phase), amplitude (3,), angular_frequency in radians per time.
 
     >>> PeriodicDrive([2.0, 0, 0], angular_frequency=np.pi).torque(1.0, np.array([1.0, 0, 0, 0]), np.zeros(3)).tolist()
@@ -34,11 +34,6 @@ class PeriodicDrive(Torque):
     def __post_init__(self) -> None:
         checked_frame(self.frame)
         object.__setattr__(self, "amplitude", checked_vector(self.amplitude, "the amplitude of a drive"))
-
-    @property
-    def needs_attitude(self) -> bool:
-        """True only if the torque is fixed in space."""
-        return self.frame == "space"
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """The amplitude times the cosine at `time`, in body axes."""

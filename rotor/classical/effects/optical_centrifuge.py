@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque, matrix_field, number_field
 from rotor.classical.effects.dipole_in_field import InducedDipole
+from rotor.classical.effects.torques import checked_matrix
 from rotor.classical.torque_form import TURNING, TorqueForm, torque_form
 
 
@@ -43,7 +44,9 @@ class OpticalCentrifuge(Torque):
     def __post_init__(self) -> None:
         if not np.isfinite([self.field, self.acceleration, self.angular_frequency, self.phase]).all():
             raise ValueError("an optical centrifuge: expected finite field, acceleration, angular_frequency and phase")
-        object.__setattr__(self, "polarizability", InducedDipole(self.polarizability, [1.0, 0.0, 0.0]).polarizability)
+        object.__setattr__(
+            self, "polarizability", checked_matrix(self.polarizability, "a polarizability", symmetric=True)
+        )
 
     def angle(self, time: float) -> float:
         """φ(t) from X towards Y, rad."""

@@ -57,8 +57,34 @@ def checked_vector(vector: ArrayLike, what: str) -> Floats:
     return array
 
 
+def checked_matrix(entries: ArrayLike, what: str, symmetric: bool = False) -> Floats:
+    """A finite matrix (3, 3), read-only, from its rows or its diagonal (3,), or a ValueError that names `what`."""
+    array = np.array(entries, dtype=np.float64)
+    matrix = np.diag(array) if array.shape == (3,) else array
+    if (
+        matrix.shape != (3, 3)
+        or not np.all(np.isfinite(matrix))
+        or (symmetric and not np.array_equal(matrix, matrix.T))
+    ):
+        kind, remedy = ("symmetric, ", "; for a nearly symmetric one give (α + αᵀ)/2") if symmetric else ("", "")
+        raise ValueError(f"{what}: expected 3 numbers or a {kind}finite 3x3 matrix; got {array.tolist()}{remedy}")
+    matrix.setflags(write=False)
+    return matrix
+
+
+class FramedTorque(Torque):
+    """A torque along a vector that is fixed in the body or in space."""
+
+    frame: Frame
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
+
 @dataclass(frozen=True)
-class ConstantTorque(Torque):
+class ConstantTorque(FramedTorque):
     """A torque (3,) that is constant in body axes (a thruster) or in space.
 
     A constant torque in space has no potential: a rotation about it by 2π does work.
@@ -75,11 +101,6 @@ class ConstantTorque(Torque):
         checked_frame(self.frame)
         object.__setattr__(self, "vector", checked_vector(self.vector, "a constant torque"))
 
-    @property
-    def needs_attitude(self) -> bool:
-        """Only where the torque is fixed in space."""
-        return self.frame == "space"
-
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """The constant vector in body axes."""
         return in_body(self.vector, self.frame, attitude)
@@ -90,7 +111,7 @@ class ConstantTorque(Torque):
 
 
 @dataclass(frozen=True)
-class TimedTorque(Torque):
+class TimedTorque(FramedTorque):
     """A torque that is a given function of time, `history(time)` -> (3,), in body axes or in space.
 
     >>> ramp = TimedTorque(lambda time: [time, 0.0, 0.0])
@@ -107,11 +128,6 @@ class TimedTorque(Torque):
         checked_frame(self.frame)
         if not callable(self.history):
             raise ValueError("a timed torque needs a function of time that returns three components")
-
-    @property
-    def needs_attitude(self) -> bool:
-        """Only where the torque is fixed in space."""
-        return self.frame == "space"
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """The vector at `time`, in body axes."""

@@ -35,24 +35,10 @@ EXACT_INPUT = "moments and angular momentum have no stated uncertainty"
 def attitude_budget(
     motion: FreeMotion, last: float, growth_rate: float, converted: bool, relative: Floats | None = None
 ) -> ErrorBudget:
-    """The errors of the attitude of one body.
+    """The errors of the attitude of one body, in rad.
 
-    Parameters
-    ----------
-    motion : FreeMotion
-    last : float
-        The time farthest from 0, in the unit of the motion.
-    growth_rate : float
-        Growth rate of a small deviation from the unstable axis; 0 without such an axis.
-    converted : bool
-        Whether times and momenta were converted from other units.
-    relative : (3,) array, optional
-        Relative errors of the moments; None: not known.
-
-    Returns
-    -------
-    ErrorBudget
-        In rad.
+    last: the time farthest from 0. growth_rate: of a small deviation from the unstable axis, 0 without such an axis. converted: whether
+    times and momenta were converted from other units. relative: relative errors of the moments (3,), None if not known.
     """
     turned = _fastest(motion) * last
     rounding = attitude_rounding(turned, converted)

@@ -99,16 +99,7 @@ def propagate(
 def over_blocks(kernel: Any, blocks: int, arguments: tuple[Any, ...], executor: ThreadPoolExecutor | None) -> None:
     """Call kernel((first, last), *arguments) for all blocks at once, or for parts of them by the threads of an executor.
 
-    Parameters
-    ----------
-    kernel : function
-        A compiled loop that releases the interpreter lock.
-    blocks : int
-        Number of blocks.
-    arguments : tuple
-        Arguments of the kernel after the range of blocks; it changes arrays in place.
-    executor : ThreadPoolExecutor or None
-        None: no threads.
+    kernel: a compiled loop that releases the interpreter lock and changes arrays in place.
     """
     if executor is None:
         kernel((0, blocks), *arguments)

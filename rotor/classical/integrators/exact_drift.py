@@ -31,52 +31,14 @@ class ExactDrift(Composed):
     """
 
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
-        """One evaluation per time for free motion, otherwise kicks and drifts.
-
-        Parameters
-        ----------
-        system : System
-            Moments and effects.
-        momentum, attitude : (n, 3) array, (n, 4) array
-            The start of n bodies, at times[0]; momentum in the body.
-        times : (t,) array
-            Increasing or decreasing.
-
-        Returns
-        -------
-        momenta : (t, n, 3) array
-            In body axes.
-        attitudes : (t, n, 4) array
-            Unit quaternions.
-        steps : int
-            Number of steps; 0 for free motion.
-
-        Raises
-        ------
-        ValueError
-            With torques, as in `KickDrift.states`.
-        """
+        """As `Method.states`: for free motion one evaluation per time and no steps, otherwise kicks and drifts."""
         if not system.free:
             return super().states(system, momentum, attitude, times)
         path, attitudes = free_motion(system.start_moments, momentum, attitude).at(times - times[0])
         return np.moveaxis(path, 1, 0), np.moveaxis(attitudes, 1, 0), 0
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """The state after steps x step; an exact state needs no rounding compensation.
-
-        Parameters
-        ----------
-        moments : (n, 3) array
-            Principal moments during the drift.
-        state, carry : (n, 7) array
-            Momentum and attitude, and their rounding compensation; both change in place.
-        step : float
-            Length of a step.
-        steps : int
-            Number of steps.
-        whole : bool
-            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
-        """
+        """As `KickDrift.drift`: the state after steps x step; an exact state needs no rounding compensation."""
         momentum, attitude = free_motion(moments, state[:, :3], state[:, 3:]).at(step * steps)
         state[:, :3], state[:, 3:] = momentum, attitude
         carry[:] = 0.0

@@ -63,26 +63,7 @@ class LieRungeKutta(Method):
             raise ValueError(f"a fixed step is a positive time; got {self.fixed_step!r}")
 
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
-        """The states of n bodies at all times, by steps that end at each of the times.
-
-        Parameters
-        ----------
-        system : System
-            Moments and effects.
-        momentum, attitude : (n, 3) array, (n, 4) array
-            The start of n bodies, at times[0]; momentum in the body.
-        times : (t,) array
-            Increasing or decreasing.
-
-        Returns
-        -------
-        momenta : (t, n, 3) array
-            In body axes.
-        attitudes : (t, n, 4) array
-            Unit quaternions.
-        steps : int
-            Number of steps.
-        """
+        """As `Method.states`, by steps that end at each of the times."""
         space, q, taken = rotate(attitude, momentum), np.array(attitude), 0
         path = np.empty((len(times), len(q), 7))
         path[0, :, :3], path[0, :, 3:] = momentum, attitude

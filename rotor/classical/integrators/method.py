@@ -181,30 +181,9 @@ class KickDrift(Method):
         """
 
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
-        """Steps of equal length from each time to the next, the longest that do not exceed `step`.
+        """As `Method.states`, by steps of equal length from each time to the next, the longest that do not exceed `step`.
 
-        Parameters
-        ----------
-        system : System
-            Moments and effects.
-        momentum, attitude : (n, 3) array, (n, 4) array
-            The start of n bodies, at times[0]; momentum in the body.
-        times : (t,) array
-            Increasing or decreasing.
-
-        Returns
-        -------
-        momenta : (t, n, 3) array
-            In body axes.
-        attitudes : (t, n, 4) array
-            Unit quaternions.
-        steps : int
-            Number of steps.
-
-        Raises
-        ------
-        ValueError
-            For torques that depend on angular velocity, and for added inertia: they need `LieRungeKutta`.
+        Raises ValueError for torques that depend on angular velocity, and for added inertia: they need `LieRungeKutta`.
         """
         from rotor.classical.integrators._step_kernels import rows
 

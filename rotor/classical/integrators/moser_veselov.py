@@ -62,25 +62,9 @@ class MoserVeselov(KickDrift):
         return fractions(self.kick_order)
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """Steps with moments modified for the invariants the drift starts with.
+        """As `KickDrift.drift`, with moments modified for the invariants the drift starts with.
 
-        Parameters
-        ----------
-        moments : (n, 3) array
-            Principal moments during the drift.
-        state, carry : (n, 7) array
-            Momentum and attitude, and their rounding compensation; both change in place.
-        step : float
-            Length of a step.
-        steps : int
-            Number of steps.
-        whole : bool
-            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
-
-        Raises
-        ------
-        ValueError
-            If a step is too long for the motion or the body is too nearly linear.
+        Raises ValueError if a step is too long for the motion or the body is too nearly linear.
         """
         from rotor.classical.integrators._step_kernels import moser_veselov
 
@@ -103,22 +87,10 @@ class MoserVeselov(KickDrift):
 
 
 def modified_moments(moments: Floats, momentum: Floats, step: float, order: int) -> Floats:
-    """Moments for which the map has this order at the invariants of the motion.
+    """Moments J (n, 3) for which the map has this order at the invariants of the motion.
 
-    Parameters
-    ----------
-    moments, momentum : (n, 3) array
-        Principal moments, none of them zero, and angular momentum in body axes.
-    step : float
-        Length of a step.
-    order : int
-        2, 4, 6 or 8.
-
-    Returns
-    -------
-    (n, 3) array
-        J with 1/J_i = S/I_i + D, S = 1 + Σ S_ab N^a H^b, D = Σ D_ab N^a H^b, N = (h|L|)²/2, H = h² energy, summed to
-        a + b = order/2 - 1 (Hairer and Vilmart 2006).
+    1/J_i = S/I_i + D, S = 1 + Σ S_ab N^a H^b, D = Σ D_ab N^a H^b, N = (h|L|)²/2, H = h² energy, summed to a + b = order/2 - 1
+    (Hairer and Vilmart 2006). moments, momentum: (n, 3), no moment is zero.
     """
     n, h = 0.5 * step**2 * np.sum(momentum**2, axis=-1), step**2 * kinetic_energy(momentum, momentum / moments)
     s, d = np.ones_like(n), np.zeros_like(n)

@@ -39,25 +39,9 @@ class RotationSplitting(Composed):
     """
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """Turns about axes 1, 2, 3, 2, 1.
+        """As `KickDrift.drift`: turns about axes 1, 2, 3, 2, 1.
 
-        Parameters
-        ----------
-        moments : (n, 3) array
-            Principal moments during the drift.
-        state, carry : (n, 7) array
-            Momentum and attitude, and their rounding compensation; both change in place.
-        step : float
-            Length of a step.
-        steps : int
-            Number of steps.
-        whole : bool
-            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
-
-        Raises
-        ------
-        ValueError
-            For a linear rotor, which `SymmetricTopSplitting` steps.
+        Raises ValueError for a linear rotor, which `SymmetricTopSplitting` steps.
         """
         from rotor.classical.integrators._step_kernels import rotations
 
@@ -83,24 +67,7 @@ class SymmetricTopSplitting(Composed):
     """
 
     def follow_compiled(self, system: System, times: Floats, counts: NDArray[np.int64], path: Floats) -> bool:
-        """All steps of all bodies in a compiled call, if all effects have a compiled form and the steps are many enough.
-
-        Parameters
-        ----------
-        system : System
-            Moments and effects.
-        times : (t,) array
-            Increasing or decreasing.
-        counts : (t - 1,) array
-            Steps between neighbouring times.
-        path : (t, n, 7) array
-            Momentum and attitude; changed in place.
-
-        Returns
-        -------
-        bool
-            Whether it was done.
-        """
+        """As `KickDrift.follow_compiled`, if all effects have a compiled form and the steps are many enough."""
         few = counts.sum() * len(self.kick_fractions) < WORTH_LOADING
         if system.free or system.compiled is None or few or not kernels_are_compiled():
             return False
@@ -114,21 +81,7 @@ class SymmetricTopSplitting(Composed):
         return True
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """Half the larger remainder, the smaller one, half the larger one; the sphere for all steps at once.
-
-        Parameters
-        ----------
-        moments : (n, 3) array
-            Principal moments during the drift.
-        state, carry : (n, 7) array
-            Momentum and attitude, and their rounding compensation; both change in place.
-        step : float
-            Length of a step.
-        steps : int
-            Number of steps.
-        whole : bool
-            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
-        """
+        """As `KickDrift.drift`: half the larger remainder, the smaller one, half the larger one; the sphere for all steps at once."""
         from rotor.classical.integrators._step_kernels import symmetric
 
         inverse = acting_inverse(moments)

@@ -121,21 +121,9 @@ class Motion:
 
 
 def rigid_motion(owners: Ints, masses: Floats, positions: Floats, velocities: Floats, forces: Floats) -> Motion:
-    """The rigid motion of points that belong to molecules.
+    """The rigid motion of points (n, 3) in space; owners: the molecule of each point, rising from 0.
 
-    Parameters
-    ----------
-    owners : (n,) array
-        Molecule of each point, rising from 0.
-    masses : (n,) array
-        u.
-    positions, velocities, forces : (n, 3) array
-        In space.
-
-    Returns
-    -------
-    Motion
-        P = Σ m v, L = Σ m (r - R) x v, I = Σ m (d² 1 - d dᵀ), F = Σ f, N = Σ (r - R) x f; internal forces of constraint drop out.
+    P = Σ m v, L = Σ m (r - R) x v, I = Σ m (d² 1 - d dᵀ), F = Σ f, N = Σ (r - R) x f; internal forces of constraint drop out.
     """
     mass = np.bincount(owners, masses).astype(np.float64)
     lever = positions - centres(owners, masses, positions)[owners]
@@ -163,24 +151,7 @@ def _sums(owners: Ints, rows: Floats) -> Floats:
 
 
 def point_velocities(motion: Motion, owners: Ints, masses: Floats, positions: Floats) -> Floats:
-    """Velocities V + ω x d of points that move with their molecules.
-
-    Parameters
-    ----------
-    motion : Motion
-        Of the molecules.
-    owners : (n,) array
-        Molecule of each point, rising from 0.
-    masses : (n,) array
-        Of the points, u.
-    positions : (n, 3) array
-        Of the points, Å.
-
-    Returns
-    -------
-    (n, 3) array
-        Å √(eV/u).
-    """
+    """Velocities V + ω x d (n, 3), Å √(eV/u), of points that move with their molecules; arguments as of `rigid_motion`."""
     omega = np.einsum("nij,nj->ni", motion.inverse, motion.angular_momentum)
     lever = positions - centres(owners, masses, positions)[owners]
     return np.asarray((motion.momentum / motion.mass[:, None])[owners] + np.cross(omega[owners], lever))
@@ -226,7 +197,7 @@ def make_engine_input(atoms: Any, settings: Settings) -> EngineInput:
         )
         for kind, span in zip(species, spans, strict=True)
     ]
-    removed = 0 if settings.ensemble == "langevin" else 3
+    removed = settings.removed_degrees
     motion = _starting_motion(atoms, bodies, pose, settings, removed)
     places, speeds = _sites(bodies, pose, body_axes, *motion)
     return EngineInput(species, bodies.species, places, speeds, edges, bodies.degrees(removed))

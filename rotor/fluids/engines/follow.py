@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.checks import RunStopped
-from rotor.fluids.checkpoint import TextFile, csv_line, trajectory_file
+from rotor.fluids.checkpoint import csv_line
 from rotor.fluids.engines.engine_input import EngineInput, Frame, make_engine_input, point_velocities
 from rotor.fluids.engines.results import engine_frames, frame_row
 from rotor.fluids.record import FluidRecord
-from rotor.fluids.run import COLUMNS, Outputs, ns_per_day, progress_bar
+from rotor.fluids.run import Outputs, ns_per_day, open_outputs, progress_bar
 from rotor.fluids.settings import Settings
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def _follow(
     rows, started = [], time.perf_counter()
     with ExitStack() as stack, progress_bar() as shown:
         on_start()
-        csv, trajectories = _opened(stack, outputs)
+        csv, trajectories = open_outputs(stack, outputs, {})
         for frame in itertools.chain([first], frames):
             rows.append(frame_row(frame, engine_input, settings))
             if csv is not None:
@@ -120,19 +120,9 @@ def _follow(
             if trajectories and frame.step % (outputs.frames_every or settings.every) == 0:
                 placed = _placed(frame, engine_input, atoms)
                 for file in trajectories:
-                    file.add(placed, rows[-1][0])
+                    file.add_frame(placed, rows[-1][0])
             shown(frame.step, settings.steps, ns_per_day(settings, frame.step, time.perf_counter() - started))
     return FluidRecord(*np.array(rows).T)
-
-
-def _opened(stack: ExitStack, outputs: Outputs) -> tuple[Any, list[Any]]:
-    """The growing files, closed with the stack."""
-    trajectories = [stack.enter_context(closing(trajectory_file(path))) for path in outputs.trajectories]
-    if outputs.csv is None:
-        return None, trajectories
-    csv = stack.enter_context(closing(TextFile(outputs.csv)))
-    csv.add(",".join(COLUMNS) + "\n")
-    return csv, trajectories
 
 
 def _placed(frame: Frame, engine_input: EngineInput, atoms: Atoms) -> Atoms:

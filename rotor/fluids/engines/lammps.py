@@ -70,23 +70,7 @@ def write_files(
     accuracy: float = 1e-5,
     kspace: str = "pppm",
 ) -> None:
-    """Write the input files of LAMMPS into a folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Where.
-    engine_input : EngineInput
-        Molecules and cell.
-    settings : Settings
-        Of the run.
-    form : Form
-        Of the charges under a cutoff.
-    accuracy : float
-        Of the forces of Ewald's sum, relative.
-    kspace : str
-        LAMMPS' name of the solver.
-    """
+    """Write the input files of LAMMPS into a folder; arguments as of `input_file`."""
     (folder / "data.box").write_text(data_file(engine_input), encoding="ascii")
     if settings.electrostatics != "ewald":
         (folder / "pairs.table").write_text(table_file(engine_input, settings, form), encoding="ascii")

@@ -107,26 +107,7 @@ def table_file(engine_input: EngineInput, settings: Settings, form: Form) -> str
 
 
 def pair_commands(engine_input: EngineInput, settings: Settings, form: Form, accuracy: float, kspace: str) -> list[str]:
-    """The pair style with its coefficients.
-
-    Parameters
-    ----------
-    engine_input : EngineInput
-        Molecules and cell.
-    settings : Settings
-        Of the run.
-    form : Form
-        Of the charges under a cutoff.
-    accuracy : float
-        Of the forces of Ewald's sum, relative.
-    kspace : str
-        LAMMPS' name of the solver.
-
-    Returns
-    -------
-    list of str
-        Commands.
-    """
+    """The pair style with its coefficients; arguments as of `input_file`."""
     pairs, cutoff = _pairs(engine_input), settings.cutoff_angstrom
     charged = any(site.charge_e for kind in engine_input.species for site in kind.model.sites)
     if charged and settings.electrostatics != "ewald":
@@ -181,23 +162,7 @@ def input_file(
 ) -> str:
     """The commands before the run; they read the files data.box and pairs.table beside them.
 
-    Parameters
-    ----------
-    engine_input : EngineInput
-        Molecules and cell.
-    settings : Settings
-        Of the run.
-    form : Form
-        Of the charges under a cutoff.
-    accuracy : float
-        Of the forces of Ewald's sum, relative.
-    kspace : str
-        LAMMPS' name of the solver.
-
-    Returns
-    -------
-    str
-        Text of the file.
+    form: of the charges under a cutoff. accuracy, kspace: relative error of the forces of Ewald's sum, and LAMMPS' name of its solver.
     """
     bonded = bool(np.any(engine_input.sites_per_kind > 1))
     lines = ["units metal", "atom_style full", "boundary p p p"]

@@ -56,24 +56,7 @@ def load() -> Any:
 
 
 def build_system(engine_input: EngineInput, settings: Settings, form: Form, accuracy: float) -> OpenMMSystem:
-    """The system of a box: masses, constraints, virtual sites, Lennard-Jones and charges.
-
-    Parameters
-    ----------
-    engine_input : EngineInput
-        Molecules and cell.
-    settings : Settings
-        Of the run.
-    form : Form
-        Of the charges under a cutoff.
-    accuracy : float
-        Of the forces of Ewald's sum (PME), relative.
-
-    Returns
-    -------
-    OpenMMSystem
-        The system, with the meaning of its particles.
-    """
+    """The system of a box: masses, constraints, virtual sites, Lennard-Jones and charges; arguments as of `session`."""
     mm = load()
     system = mm.System()
     a, b, c = engine_input.edges / 10
@@ -106,29 +89,7 @@ def build_system(engine_input: EngineInput, settings: Settings, form: Form, accu
 
 
 def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
-    """The pair force without its particles.
-
-    Parameters
-    ----------
-    mm : module
-        openmm.
-    settings : Settings
-        Of the run.
-    form : Form
-        Of the charges under a cutoff.
-    accuracy : float
-        Of the forces of Ewald's sum (PME), relative.
-
-    Returns
-    -------
-    openmm.Force
-        NonbondedForce.
-
-    Raises
-    ------
-    ValueError
-        Electrostatics that OpenMM does not have.
-    """
+    """The NonbondedForce without its particles; ValueError for electrostatics that OpenMM does not have."""
     force = mm.NonbondedForce()
     force.setCutoffDistance(settings.cutoff_angstrom / 10)
     if settings.electrostatics == "reaction-field":
@@ -325,28 +286,9 @@ def _context(mm: Any, system: Any, engine_integrator: Any, platform: str | None,
 
 
 def frames(engine_input: EngineInput, settings: Settings, form: Form | None = None, **options: Any) -> Iterator[Frame]:
-    """Run, and give a frame at step 0 and after every `settings.every` steps.
+    """Run, and give a frame at step 0 and after every `settings.every` steps; arguments as of `session`.
 
-    Parameters
-    ----------
-    engine_input : EngineInput
-        The box as engines take it.
-    settings : Settings
-        What is run.
-    form : Form, optional
-        Options of the potential outside `settings`; see `session`.
-    options : object
-        As of `session`.
-
-    Returns
-    -------
-    iterator of Frame
-        Positions in Å, energies in eV.
-
-    Raises
-    ------
-    RuntimeError
-        If OpenMM stops during the run.
+    Raises RuntimeError if OpenMM stops during the run.
     """
     mm = load()
     try:

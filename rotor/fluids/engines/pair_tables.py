@@ -27,29 +27,11 @@ class Form:
     alpha_per_angstrom: float = 0.2
 
 
-def pair_energy(
-    r: Floats, sites: tuple[Site, Site], settings: Settings, form: Form, charges: bool = True
-) -> tuple[Floats, Floats]:
-    """Energy and force of two sites at distances up to the cutoff.
+def pair_energy(r: Floats, sites: tuple[Site, Site], settings: Settings, form: Form) -> tuple[Floats, Floats]:
+    """Energy (eV) and force (eV/Å) of two sites at distances (n,) in Å up to the cutoff.
 
-    Parameters
-    ----------
-    r : (n,) array
-        Distances, Å.
-    sites : (Site, Site)
-        The two sites.
-    settings : Settings
-        Cutoff and electrostatics.
-    form : Form
-        Of the charges with a cutoff.
-    charges : bool
-        False: without the second term, for a lattice sum.
-
-    Returns
-    -------
-    (n,) array, (n,) array
-        S 4ε [(σ/r)¹² - (σ/r)⁶] + q₁q₂/4πε₀ f(r) in eV, with the switch S and the form f of charges under a cutoff as in
-        `rotor.fluids.forces.interactions`, and minus its slope in eV/Å.
+    S 4ε [(σ/r)¹² - (σ/r)⁶] + q₁q₂/4πε₀ f(r) with the switch S and the form f of charges under a cutoff as in
+    `rotor.fluids.forces.interactions`, and minus its slope.
     """
     first, other = sites
     sigma, epsilon = mixed((first.sigma_angstrom, other.sigma_angstrom), (first.epsilon_ev, other.epsilon_ev))
@@ -59,8 +41,6 @@ def pair_energy(
     switch, fall = 1 - t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2 * slope
     bare = 4 * epsilon * (sixth**2 - sixth)
     energy, force = switch * bare, switch * 24 * epsilon * (2 * sixth**2 - sixth) / r + fall * bare
-    if not charges:
-        return energy, force
     f, g = _charges(r, settings, form)
     qq = COULOMB_EV_ANGSTROM * first.charge_e * other.charge_e
     return energy + qq * f, force + qq * g

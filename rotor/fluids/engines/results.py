@@ -66,30 +66,9 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
 
 
 def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **options: Any) -> Generator[Frame]:
-    """The frames of an engine by its name, each checked to be finite.
+    """The frames of an engine by its name, at step 0 and after every `settings.every` steps; options: as of `run_engine`.
 
-    Parameters
-    ----------
-    name : str
-        "openmm" or "lammps".
-    engine_input : EngineInput
-        The box as engines take it.
-    settings : Settings
-        What is run.
-    options : object
-        Of the engine.
-
-    Returns
-    -------
-    iterator of Frame
-        At step 0 and after every `settings.every` steps.
-
-    Raises
-    ------
-    ValueError
-        For an unknown engine.
-    RuntimeError
-        For energies or positions that are not finite.
+    Raises ValueError for an unknown engine, RuntimeError for energies or positions that are not finite.
     """
     if name not in ENGINES:
         raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -139,8 +140,8 @@ def _by_label(symbols: list[str], labels: Integers, models: tuple[RigidModel, ..
     return kinds
 
 
-def _by_symbols(symbols: list[str], models: tuple[RigidModel, ...]) -> list[int]:
-    """Kinds of consecutive molecules, the longest model that fits first."""
+def kinds_by_symbols(symbols: list[str], models: Sequence[RigidModel]) -> list[int]:
+    """Numbers of the models of consecutive molecules, the longest model that fits first; ValueError if none fits."""
     order = sorted(range(len(models)), key=lambda kind: -len(models[kind].symbols))
     kinds, at = [], 0
     while at < len(symbols):
@@ -156,7 +157,7 @@ def _by_symbols(symbols: list[str], models: tuple[RigidModel, ...]) -> list[int]
     return kinds
 
 
-def _spelled(models: tuple[RigidModel, ...]) -> str:
+def _spelled(models: Sequence[RigidModel]) -> str:
     return ", ".join(f"{model.name} ({'-'.join(model.symbols)})" for model in models)
 
 
@@ -173,7 +174,7 @@ def assemble(atoms: Any, models: tuple[RigidModel, ...]) -> Assembly:
     if not len(atoms):
         raise ValueError("a box without atoms has no energy; at least one molecule is expected")
     symbols, labels = atoms.get_chemical_symbols(), atoms.arrays.get("molecule")
-    kinds = np.array(_by_symbols(symbols, models) if labels is None else _by_label(symbols, labels, models))
+    kinds = np.array(kinds_by_symbols(symbols, models) if labels is None else _by_label(symbols, labels, models))
     sizes = np.array([(len(model.symbols), len(model.sites)) for model in models])[kinds]
     starts = np.vstack((np.zeros((1, 2), dtype=np.int64), np.cumsum(sizes, axis=0)))
     return Assembly(models, kinds, np.ascontiguousarray(starts[:, 0]), np.ascontiguousarray(starts[:, 1]))

@@ -36,50 +36,18 @@ class EwaldParameters:
 
 
 def real_space_error(alpha: float, cutoff: float, charges_squared: float, count: int, volume: float) -> float:
-    """Root mean square error of a force from pairs beyond the cutoff, 2 Q² exp(-α² r_c²)/√(N r_c V), Q² = k_e Σ q².
+    """Rms error of a force (eV/Å) from pairs beyond the cutoff, 2 Q² exp(-α² r_c²)/√(N r_c V), Q² = k_e Σ q².
 
-    Parameters
-    ----------
-    alpha : float
-        1/Å.
-    cutoff : float
-        r_c, Å.
-    charges_squared : float
-        Σ q², e².
-    count : int
-        Number of charges N.
-    volume : float
-        V, Å³.
-
-    Returns
-    -------
-    float
-        eV/Å.
+    alpha: 1/Å. cutoff: r_c, Å. charges_squared: Σ q², e². count: number of charges N. volume: V, Å³.
     """
     q = COULOMB_EV_ANGSTROM * charges_squared
     return 2 * q * math.exp(-((alpha * cutoff) ** 2)) / math.sqrt(count * cutoff * volume)
 
 
 def fourier_error(alpha: float, k_cut: float, charges_squared: float, count: int, volume: float) -> float:
-    """Root mean square error of a force from wave vectors beyond k_c, 2 Q² α/L √(1/(π n N)) exp(-k_c²/4α²), n = k_c L/2π, L = ∛V.
+    """Rms error of a force (eV/Å) from wave vectors beyond k_c, 2 Q² α/L √(1/(π n N)) exp(-k_c²/4α²), n = k_c L/2π, L = ∛V.
 
-    Parameters
-    ----------
-    alpha : float
-        1/Å.
-    k_cut : float
-        k_c, 1/Å.
-    charges_squared : float
-        Σ q², e².
-    count : int
-        Number of charges N.
-    volume : float
-        V, Å³.
-
-    Returns
-    -------
-    float
-        eV/Å.
+    k_cut: k_c, 1/Å; the others as of `real_space_error`.
     """
     q, edge = COULOMB_EV_ANGSTROM * charges_squared, volume ** (1 / 3)
     shells = k_cut * edge / (2 * math.pi)

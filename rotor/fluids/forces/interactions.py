@@ -122,22 +122,10 @@ def _beyond(c12: float, c6: float, cutoff: float, width: float) -> tuple[float, 
 def tail(
     models: tuple[RigidModel, ...], numbers: Integers, cutoff_angstrom: float, width_angstrom: float
 ) -> tuple[float, float]:
-    """Dispersion beyond the cutoff, for a uniform liquid.
+    """Energy (eV Å³, times the volume) and pressure (times its square) of the dispersion beyond the cutoff, for a uniform liquid.
 
-    Parameters
-    ----------
-    models : tuple of RigidModel
-        Of the box.
-    numbers : (models,) array
-        Molecules of each model.
-    cutoff_angstrom, width_angstrom : float
-        Cutoff, and width of the switch before it.
-
-    Returns
-    -------
-    float, float
-        Energy times volume (eV Å³) and pressure times volume squared: 2π Σ N_a N_b ∫ ΔU r² dr over all ordered couples of
-        molecules and their sites (Allen and Tildesley (2017), ch. 2).
+    2π Σ N_a N_b ∫ ΔU r² dr over all ordered couples of molecules and their sites (Allen and Tildesley (2017), ch. 2); numbers: molecules
+    of each model; width_angstrom: of the switch before the cutoff.
     """
     energy = pressure = 0.0
     for first, n in zip(models, numbers, strict=True):

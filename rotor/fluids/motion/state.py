@@ -81,17 +81,7 @@ class Flows:
         symmetric(state.spin, state.carry, self._inverse, self._axes, time, _WHOLE_STEP, 1)
 
     def kick(self, state: State, force: Floats, torque: Floats, time: float) -> None:
-        """Momenta gain force and torque times a time, in place.
-
-        Parameters
-        ----------
-        state : State
-            Of the bodies.
-        force, torque : (n, 3) array
-            In space, and in body axes.
-        time : float
-            In ASE's unit.
-        """
+        """Momenta gain force (n, 3) in space and torque (n, 3) in body axes times a time, in place."""
         from rotor.classical.integrators._step_kernels import kick
 
         state.momentum += force * time

@@ -80,19 +80,7 @@ def kinetic_energy(bodies: Bodies, momentum: Floats, angular: Floats) -> Kinetic
 def step_correction(bodies: Bodies, force: Floats, torque: Floats, step: float) -> Kinetic:
     """h² Σ F²/m and h² Σ T_i²/I_i: with a factor of `THERMOMETERS`, what a thermometer adds to the full step's energy.
 
-    Parameters
-    ----------
-    bodies : Bodies
-        The molecules.
-    force, torque : (n, 3) array
-        In space, and in body axes.
-    step : float
-        h, in ASE's unit of time.
-
-    Returns
-    -------
-    Kinetic
-        eV.
+    force, torque: (n, 3) in space, and in body axes. step: h, in ASE's unit of time.
     """
     return kinetic_energy(bodies, force, torque).times(2.0 * step**2)
 

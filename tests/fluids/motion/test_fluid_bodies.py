@@ -211,7 +211,7 @@ def test_a_lattice_of_water_has_its_density_and_no_overlap():
 def test_models_find_their_molecules_in_order():
     water = find_model("spce")
     assert model_labels(Atoms("OH2OH2", positions=np.zeros((6, 3))), [water]).tolist() == [0, 0, 0, 1, 1, 1]
-    with pytest.raises(ValueError, match=r"atom 3 \(H\) does not begin a molecule"):
+    with pytest.raises(ValueError, match=r"no molecule begins with atom 3 \(H-O-H\.\.\.\)"):
         model_labels(Atoms("OH2HOH", positions=np.zeros((6, 3))), [water])
 
 
