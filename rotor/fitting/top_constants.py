@@ -25,12 +25,25 @@ from rotor.quantum.solve import solve_levels
 from rotor.tops.constants.constants import Constants
 from rotor.tops.constants.parameter_names import parse_name
 from rotor.tops.constants.uncertain_numbers import write_number
-from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
+from rotor.tops.internal_rotation import BARE, InternalRotationConstants, is_torsional
 from rotor.tops.spins.spin_constants import SpinConstants, spin_names
 from rotor.tops.states.state_constants import StateConstants, state_numbers
 from rotor.tops.top import Top
 
 DIPOLES = ("mu_a", "mu_b", "mu_c")
+
+
+def unit_of_constant(name: str) -> str:
+    """Unit of a constant of a fit: MHz, D of a dipole component, rad of an angle of an internal rotor, none of rho.
+
+    >>> [unit_of_constant(name) for name in ("A", "mu_a", "delta_1", "rho")]
+    ['MHz', 'D', 'rad', '']
+    """
+    if name in DIPOLES:
+        return "D"
+    if name in BARE:
+        return "" if name == "rho" else "rad"
+    return "MHz"
 
 
 @dataclass(frozen=True, eq=False)

@@ -403,6 +403,9 @@ def test_a_fit_of_a_methyl_group_names_what_was_meant_and_what_is_not_written(ca
         assert (code, f"did you mean {meant}?" in err) == (2, True), err
     code, _, err = call("fit", "semicolons.csv", "--start", "top.toml", "--free", "A")
     assert (code, "its columns are separated by ';'; expected commas" in err) == (2, True), err
+    code, shown, _ = call("fit", "seen.csv", "--start", "top.toml", "--free", "A,delta", "--table", "fit.tex")
+    assert (code, "value (MHz; delta in rad)" in shown) == (0, True), shown
+    assert "$\\delta$ & rad &" in (folder / "fit.tex").read_text()
     code, _, err = call("fit", "seen.csv", "--start", "top.toml", "--free", "A,B,C", "--out", "fitted")
     assert (code, "fitted.par, fitted.var are not written: internal rotation: SPFIT's" in err) == (0, True), err
 

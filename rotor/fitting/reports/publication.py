@@ -11,7 +11,7 @@ from decimal import Decimal
 import numpy as np
 
 from rotor.fitting.result import Fit
-from rotor.fitting.top_constants import DIPOLES
+from rotor.fitting.top_constants import unit_of_constant
 from rotor.table import counted
 
 FORMS = ("text", "markdown", "latex")
@@ -173,7 +173,9 @@ def _tied(fit: Fit) -> dict[str, str]:
 
 def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -> list[str]:
     error = row.error if row.error and math.isfinite(row.error) else None
-    unit, size = ("D", 1.0) if row.name in DIPOLES else suitable_unit(row.value, error)
+    unit, size = unit_of_constant(row.name), 1.0
+    if unit == "MHz":
+        unit, size = suitable_unit(row.value, error)
     is_determined = row.error is not None and math.isfinite(row.error)
     text = (
         value_text(row.value / size, row.error * factor / size, digits)

@@ -13,7 +13,7 @@ from rotor.fitting.assignment import Assignments
 from rotor.fitting.choice.orders import j_order
 from rotor.fitting.reports.publication import value_text
 from rotor.fitting.result import Fit
-from rotor.fitting.top_constants import DIPOLES
+from rotor.fitting.top_constants import unit_of_constant
 from rotor.table import counted
 from rotor.tops.constants.operators import distortion_terms
 
@@ -264,8 +264,14 @@ def influence(fit: Fit) -> list[str]:
 
 
 def parameter_units(fit: Fit) -> str:
-    """The units of the parameters: MHz, and D for dipole components."""
-    return "MHz; mu in D" if set(fit.parameters.names) & set(DIPOLES) else "MHz"
+    """The units of the parameters: MHz, and those of dipole components and of angles and rho of internal rotors."""
+    units = {name: unit_of_constant(name) for name in fit.parameters.names}
+    others = {"mu": "D", **{name: unit for name, unit in units.items() if unit not in ("MHz", "D")}}
+    if "D" not in units.values():
+        others.pop("mu")
+    return "; ".join(
+        ["MHz", *(f"{name} in {unit}" if unit else f"{name} without unit" for name, unit in others.items())]
+    )
 
 
 def _hamiltonian(fit: Fit) -> list[str]:
