@@ -155,6 +155,12 @@ def show(answer: Identified, report: Report) -> Iterable[Part | None]:
     if count := sum(evidence.single_line for evidence in identification.species):
         single = f"* {counted(count, 'species', 'species')} on a single line"
         yield f"{single}: a line of a species that is no candidate may pass for it"
+    if uncertain := [evidence for evidence in identification.species if evidence.uncertain]:
+        verb = "is" if len(uncertain) == 1 else "are"
+        yield (
+            f"? {counted(len(uncertain), 'species', 'species')} {verb} uncertain: as many of its lines would lie on signals by chance in "
+            f"{max(evidence.chance for evidence in uncertain):.2g} of {identification.candidates} candidates; take a wider range"
+        )
     lines = sorted(identification.unidentified, key=lambda line: line.frequency_mhz)
     yield record_table(f"{len(lines)} unidentified lines", _UNIDENTIFIED, lines, {"candidates with a line there"})
     yield "" if lines else "no unidentified line above 5 standard deviations"
@@ -163,7 +169,9 @@ def show(answer: Identified, report: Report) -> Iterable[Part | None]:
 _SPECIES = {
     "species": "{0.component.species.name}",
     "Δχ²": "{0.signal:.0f}",
-    "lines seen": lambda evidence: f"{evidence.visible}/{evidence.expected}{' *' if evidence.single_line else ''}",
+    "lines seen": lambda evidence: (
+        f"{evidence.visible}/{evidence.expected}{' *' * evidence.single_line}{' ?' * evidence.uncertain}"
+    ),
     "N (1/cm²)": "{0.component.column_per_cm2:.2e}",
     "T (K)": "{0.component.excitation_k:.0f}",
     "v (km/s)": "{0.component.velocity_km_s:.2f}",

@@ -132,6 +132,34 @@ def test_species_on_a_single_line_are_marked(call, folder):
     marked = {line.split()[0]: " * " in line for line in out.splitlines() if line.startswith(("XYZ ", "ONE "))}
     assert marked == {"XYZ": False, "ONE": True}
     assert "* 1 species on a single line" in out
+    assert {row["species"]: row["uncertain"] for row in json.loads(call(*command, "--json", "-")[1])["species"]}[
+        "XYZ"
+    ] is False
+
+
+def test_species_in_a_narrow_piece_are_uncertain(call, folder):
+    """A piece of a few widths about a line: any candidate with a line there would match."""
+    grid, seen = np.loadtxt(folder / "s.txt", unpack=True)
+    middle = int(np.argmax(seen))
+    here = np.abs(grid - grid[middle]) < 3 * grid[middle] * 2.0 / 299792.458
+    np.savetxt(folder / "n.txt", np.stack([grid, seen], axis=1)[here], header="frequency_mhz, intensity_k")
+    command = (
+        "identify",
+        str(folder / "n.txt"),
+        "--catalogue",
+        str(folder / "cats"),
+        "--velocity",
+        "3",
+        "--width",
+        "2",
+    )
+    code, out, err = call(*command, "--noise", "0.02", "--json", "-")
+    assert (code, err) == (0, "")
+    (row,) = json.loads(out)["species"]
+    assert row["uncertain"]
+    assert row["chance"] > 0.05
+    out = call(*command, "--noise", "0.02")[1]
+    assert "? 1 species is uncertain: as many of its lines would lie on signals by chance" in out
 
 
 def test_fit_of_a_source(call, folder):

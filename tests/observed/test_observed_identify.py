@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from observed_cases import artificial, injected
 
-from rotor.observed.identification.identify import identify
+from rotor.observed.identification.identify import chance_matches, identify
 from rotor.observed.identification.selection import IdentifyChoices
 from rotor.observed.model.model import Component
 from rotor.observed.spectrum import observed_spectrum
@@ -46,6 +46,20 @@ def test_species_and_unidentified_lines(case: tuple) -> None:
     facts = found.facts()
     assert facts["candidates"] == 20
     assert len(facts["species"]) == 3
+
+
+def test_species_with_many_lines_are_no_chance(case: tuple) -> None:
+    found = identify(*case[:2])
+    assert all(evidence.chance < 1e-3 and not evidence.uncertain for evidence in found.species if evidence.visible > 5)
+    assert any(evidence.visible > 5 for evidence in found.species)
+
+
+def test_chance_matches_are_those_of_random_positions() -> None:
+    """2000 candidates with 4 lines at random channels, 15 % of which have a signal: as many with 2 or more as the formula says."""
+    rng = np.random.default_rng(5)
+    hits = (rng.random((2000, 4)) < 0.15).sum(axis=1)
+    expected = chance_matches(2, 4, 0.15, 2000)
+    assert abs((hits >= 2).sum() - expected) < 4 * np.sqrt(expected)
 
 
 def test_noise_alone_needs_nothing(case: tuple) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,6 +21,7 @@ from rotor.table import Table
 _UNIDENTIFIED = 5.0  # smallest peak of an unidentified line, in standard deviations
 _RIVAL = 0.7  # smallest gain of a rival outside the model, relative to the evidence of a species
 _RIVALS = 3
+_CHANCE = 0.05  # expected number of candidates that match as well by chance, above which a species is uncertain
 
 
 @dataclass(frozen=True)
@@ -28,19 +30,26 @@ class Evidence:
 
     component: fitted. signal: increase of χ² without it, divided by the mean square of the residuals in its channels.
     expected: number of its lines above three standard deviations in the model. visible: number of these that the spectrum shows.
-    rivals: species outside the model that explain nearly as much.
+    chance: expected number of candidates whose lines, at random frequencies, would be visible as often (`chance_matches`). rivals: species
+    outside the model that explain nearly as much.
     """
 
     component: Component
     signal: float
     visible: int
     expected: int
+    chance: float
     rivals: tuple[str, ...] = ()
 
     @property
     def single_line(self) -> bool:
         """Whether at most one of its lines is visible; such a line may belong to a species outside the candidates."""
         return self.visible <= 1
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether a candidate may match as well by chance."""
+        return self.chance > _CHANCE
 
 
 @dataclass(frozen=True)
@@ -72,13 +81,13 @@ class Identification(Table):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """species, signal, visible, expected, single_line, column_per_cm2, excitation_k, velocity_km_s, fwhm_km_s."""
+        """species, signal, visible, expected, single_line, chance, uncertain, column_per_cm2, excitation_k, velocity_km_s, fwhm_km_s."""
         parts = [evidence.component for evidence in self.species]
         numbers = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
         table: dict[str, Any] = {"species": np.array(self.names, dtype=np.str_)}
         table |= {
             name: np.array([getattr(evidence, name) for evidence in self.species])
-            for name in ("signal", "visible", "expected", "single_line")
+            for name in ("signal", "visible", "expected", "single_line", "chance", "uncertain")
         }
         return table | {name: np.array([getattr(component, name) for component in parts]) for name in numbers}
 
@@ -143,7 +152,8 @@ def identify(
     Notes
     -----
     All species have nearly the same velocity and width (free within priors in the last fit). A species with a single line in the range
-    depends on this line only: check its rivals.
+    depends on this line only: check its rivals. A species is uncertain if as many lines of a candidate would lie on signals by chance, as
+    in a narrow piece of a spectrum that is full of lines.
     """
     sight, choices = sight or Sight(), choices or IdentifyChoices()
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
@@ -180,7 +190,25 @@ def _evidence(fit: SourceFit, k: int, signal: float, bank: Templates, search: Se
     gain[search.numbers] = 0.0
     order = np.argsort(-gain)[:_RIVALS]
     rivals = tuple(search.known[i].name for i in order if gain[i] > _RIVAL * gain_of_species)
-    return Evidence(component, signal, visible, expected, rivals)
+    spectrum = search.spectrum
+    occupied = float(np.mean(spectrum.intensity > VISIBLE * spectrum.noise))
+    return Evidence(
+        component, signal, visible, expected, chance_matches(visible, expected, occupied, len(search.known)), rivals
+    )
+
+
+def chance_matches(visible: int, expected: int, occupied: float, candidates: int) -> float:
+    """Expected number of candidates of which so many of the expected lines, at random frequencies, lie on signals of the spectrum.
+
+    n Σ_k≥v (m k) f^k (1 - f)^(m-k) with v visible of m expected lines, the share f of channels with a signal, and n candidates.
+
+    >>> chance_matches(1, 1, 0.1, 20), round(chance_matches(4, 4, 0.1, 20), 6)
+    (2.0, 0.002)
+    """
+    terms = (
+        math.comb(expected, k) * occupied**k * (1 - occupied) ** (expected - k) for k in range(visible, expected + 1)
+    )
+    return candidates * math.fsum(terms)
 
 
 def _lines_seen(spectrum: ObservedSpectrum, alone: Floats) -> tuple[int, int]:
