@@ -253,6 +253,10 @@ class Levels(Table):
                 f"quantum numbers {', '.join(quanta)}: these levels are labelled by {', '.join(self.quanta)}"
             )
 
+    def block_numbers(self, rows: NDArray[np.integer]) -> Ints:
+        """The number of the solved block of each of the levels `rows`."""
+        return np.searchsorted([block.start for block in self.blocks], rows, side="right") - 1
+
     def labels(self, rows: NDArray[Any]) -> list[str]:
         """The levels `rows` as text, one row of quantum numbers each."""
         return texts_of_labels(self.quanta, rows, self.halves)

@@ -15,7 +15,7 @@ column of V; W is chosen so that this is below `TOLERANCE_MHZ`. Where V is too l
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -44,33 +44,25 @@ class _Target(NamedTuple):
     row: int
     part: int
     pattern: int
-    name: tuple[int, ...]
-
-
-class _Rotation(NamedTuple):
-    """The rotation at given constants: energies and vectors by block."""
-
-    energies: dict[int, Floats]
-    vectors: dict[int, Floats]
+    name: list[int]
 
 
 class _Coupled(NamedTuple):
-    """A block at given constants: its parts, the rotation, E_r and the diagonal of H of each function, H over basis functions."""
+    """A block at given constants: its parts, vectors of the rotation, E_r and the diagonal of H, and H over basis functions."""
 
     parts: tuple[SpinPart, ...]
-    rotation: _Rotation
+    vectors: Mapping[int, Floats]
     energies: Floats
     diagonal: Floats
     matrix: Any
 
     def over_functions(self, columns: Floats) -> Floats:
         """Columns over rotational states times patterns as columns over basis functions."""
-        return turned(self.parts, columns, self.rotation.vectors)
+        return turned(self.parts, columns, self.vectors)
 
     def over_states(self, columns: Floats) -> Floats:
         """Columns over basis functions as columns over rotational states times patterns."""
-        vectors = self.rotation.vectors
-        return turned(self.parts, columns, {part.number: vectors[part.number].T for part in self.parts})
+        return turned(self.parts, columns, {part.number: self.vectors[part.number].T for part in self.parts})
 
 
 @dataclass(frozen=True)
@@ -91,28 +83,28 @@ class ContractedLevels:
         """Energies (count,) in MHz and derivatives (count, parameters) at values (parameters,) in MHz."""
         if not np.isfinite(values_mhz).all():
             raise ValueError("a block of the Hamiltonian is not finite with these constants")
-        rotation = self.rotation(values_mhz)
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(values_mhz)))
-        for parts, linear, targets in self.blocks:
+        for (_, linear, targets), (coupled, functions) in zip(self.blocks, self.coupled(values_mhz), strict=True):
             rows = np.array([target.row for target in targets])
-            coupled = _coupled(parts, linear, rotation, values_mhz)
-            energies[rows], vectors = _levels_of(coupled, self.functions(parts, targets, rotation), self.window_mhz)
+            energies[rows], vectors = _levels_of(coupled, functions, self.window_mhz)
             slopes[rows[:, None], linear.parameters] = linear.slopes(coupled.over_functions(vectors))
         return energies, slopes
 
-    def rotation(self, values_mhz: Floats) -> _Rotation:
-        """The rotation solved at values (parameters,) in MHz."""
+    def coupled(self, values_mhz: Floats) -> Iterator[tuple[_Coupled, Ints]]:
+        """Each block at values (parameters,) in MHz, and the places of the functions that its labels name."""
         solved = {number: _eigen(linear.lower(values_mhz)) for number, linear in self.rotations.items()}
-        return _Rotation(*({number: pair[i] for number, pair in solved.items()} for i in range(2)))
+        energies, vectors = ({number: pair[i] for number, pair in solved.items()} for i in range(2))
+        for parts, linear, targets in self.blocks:
+            yield _coupled(parts, linear, energies, vectors, values_mhz), self._functions(parts, targets, vectors)
 
-    def functions(self, parts: Sequence[SpinPart], targets: Sequence[_Target], rotation: _Rotation) -> Ints:
+    def _functions(self, parts: Sequence[SpinPart], targets: Sequence[_Target], vectors: Mapping[int, Floats]) -> Ints:
         """Places of the functions that the labels of a block name."""
         numbers = {parts[target.part].number for target in targets}
-        names = {number: _states_by_name(self.rotors[number], rotation.vectors[number]) for number in numbers}
+        names = {number: named_states(self.rotors[number], vectors[number]).tolist() for number in numbers}
         functions = []
         for target in targets:
             part = parts[target.part]
-            state = names[part.number][target.name]
+            state = names[part.number].index(target.name)
             functions.append(part.place.start + target.pattern * len(part.rotor.energies_mhz) + state)
         return np.array(functions, dtype=np.int64)
 
@@ -124,25 +116,26 @@ def _eigen(lower: Floats) -> tuple[Floats, Floats]:
     return energies + zero, vectors
 
 
-def _states_by_name(rotor: SolvedBlock, vectors: Floats) -> dict[tuple[int, ...], int]:
-    """Rotational states by v, Ka, Kc."""
-    return {tuple(name): state for state, name in enumerate(named_states(rotor, vectors).tolist())}
-
-
-def _coupled(parts: tuple[SpinPart, ...], linear: LinearBlock, rotation: _Rotation, values_mhz: Floats) -> _Coupled:
-    """A block at values (parameters,) in MHz."""
+def _coupled(
+    parts: tuple[SpinPart, ...],
+    linear: LinearBlock,
+    energies_mhz: Mapping[int, Floats],
+    vectors: Mapping[int, Floats],
+    values_mhz: Floats,
+) -> _Coupled:
+    """A block at values (parameters,) in MHz, with the rotation solved there."""
     from scipy.sparse import tril  # loaded in fits of large blocks only
 
     lower = linear.sparse(values_mhz)
     matrix = (lower + tril(lower, -1).T).tocsr()
-    energies, diagonal = [], []
+    diagonal = []
     for part in parts:
-        vectors = rotation.vectors[part.number]
-        energies.append(np.tile(rotation.energies[part.number], part.repeats))
-        for start in range(part.place.start, part.place.stop, len(vectors)):
-            inside = matrix[start : start + len(vectors), start : start + len(vectors)]
-            diagonal.append(np.einsum("ij,ij->j", vectors, inside @ vectors))
-    return _Coupled(parts, rotation, np.concatenate(energies), np.concatenate(diagonal), matrix)
+        turning = vectors[part.number]
+        for start in range(part.place.start, part.place.stop, len(turning)):
+            inside = matrix[start : start + len(turning), start : start + len(turning)]
+            diagonal.append(np.einsum("ij,ij->j", turning, inside @ turning))
+    energies = np.concatenate([np.tile(energies_mhz[part.number], part.repeats) for part in parts])
+    return _Coupled(parts, vectors, energies, np.concatenate(diagonal), matrix)
 
 
 def _levels_of(coupled: _Coupled, functions: Ints, window_mhz: float) -> tuple[Floats, Floats]:
@@ -237,8 +230,7 @@ def contracted_levels(
 
 def _blocks_with(levels: Levels, rows: Ints) -> list[tuple[SolvedBlock, tuple[_Target, ...]]]:
     """The blocks that contain the rows, with the labels in each."""
-    starts = np.array([block.start for block in levels.blocks])
-    block_of_row = np.searchsorted(starts, rows, side="right") - 1
+    block_of_row = levels.block_numbers(rows)
     with_targets = []
     for number in np.unique(block_of_row).tolist():
         block = levels.blocks[number]
@@ -249,16 +241,15 @@ def _blocks_with(levels: Levels, rows: Ints) -> list[tuple[SolvedBlock, tuple[_T
             part = int(np.searchsorted(stops, function, side="right"))
             chosen_part = block.spins.parts[part]
             pattern = (function - chosen_part.place.start) // len(chosen_part.rotor.energies_mhz)
-            targets.append(_Target(place, part, pattern, tuple(block.labels[function, :3].tolist())))
+            targets.append(_Target(place, part, pattern, block.labels[function, :3].tolist()))
         with_targets.append((block, tuple(targets)))
     return with_targets
 
 
 def _window(levels: ContractedLevels, values_mhz: Floats) -> float:
     """W from the largest norm of a column of V of a labelled function."""
-    rotation, longest = levels.rotation(values_mhz), 0.0
-    for parts, linear, targets in levels.blocks:
-        functions = np.unique(levels.functions(parts, targets, rotation))
-        columns = coupling_columns(_coupled(parts, linear, rotation, values_mhz), functions)
+    longest = 0.0
+    for coupled, functions in levels.coupled(values_mhz):
+        columns = coupling_columns(coupled, np.unique(functions))
         longest = max(longest, float(np.sqrt(np.einsum("ij,ij->j", columns, columns)).max()))
     return max(_LEAST_RATIO * longest, float(np.sqrt(longest**3 / TOLERANCE_MHZ)))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Workspace, distinct
+from rotor.arrays import Floats, Ints, Workspace, distinct
 from rotor.quantum.basis.state_elements import StateTerms, linear_blocks_of, wang_stacks
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
@@ -48,24 +48,23 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     for name in names:
         if name not in by_name:
             raise ValueError(f"no parameter {name} here to derive by: the effects have {', '.join(by_name)}")
-    rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
-
+    places: Ints = np.asarray(np.arange(len(levels)) if rows is None else rows, dtype=np.int64)
     of_species = [
         block.moments.slopes([(block, np.eye(len(block.energies_mhz))[:, None])], names)
         for block in levels.blocks
         if block.moments is not None
     ]
     if of_species:
-        return np.asarray(np.concatenate(of_species)[rows])
+        return np.asarray(np.concatenate(of_species)[places])
     if "f" in levels.quanta or are_with_spins(levels):
         from rotor.quantum.spins.linear_blocks import derivatives
 
-        return derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
+        return derivatives(top, levels, names, places)
     if "irrep" in levels.quanta:
-        return _derivatives_of_spherical(top, levels, names, rows)
+        return _derivatives_of_spherical(top, levels, names, places)
     if any(not block.alone for block in levels.blocks):
-        return _derivatives_of_coupled(top, levels, names, rows)
-    return _derivatives_of_uncoupled(top, levels, names, rows)
+        return _derivatives_of_coupled(top, levels, names, places)
+    return _derivatives_of_uncoupled(top, levels, names, places)
 
 
 def _derivatives_of_uncoupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
@@ -96,8 +95,7 @@ def parameter_operators(top: Top, effects: Sequence[QuantumEffect]) -> dict[str,
 
 def _derivatives_of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
     """Derivatives of levels in coupled blocks, from their linear blocks."""
-    starts = np.array([block.start for block in levels.blocks])
-    blocks = [levels.blocks[i] for i in distinct(np.searchsorted(starts, rows, side="right") - 1).tolist()]
+    blocks = [levels.blocks[i] for i in distinct(levels.block_numbers(rows)).tolist()]
     out = np.zeros((len(levels), len(names)))
     for block, linear in zip(blocks, linear_blocks_of(top, levels, names, blocks), strict=True):
         out[block.start : block.start + len(block.energies_mhz), linear.parameters] = linear.slopes(block.vectors)
@@ -134,9 +132,7 @@ def _expectations_in_blocks(levels: Levels, operators: Sequence[Operators], rows
     """`expectations` in states of Wang blocks."""
     if not levels.blocks:
         raise ValueError("these levels were solved without vectors; solve them with vectors=True")
-    starts = np.array([block.start for block in levels.blocks])
-    numbers = distinct(np.searchsorted(starts, rows, side="right") - 1)
-    blocks = [levels.blocks[i] for i in numbers.tolist()]
+    blocks = [levels.blocks[i] for i in distinct(levels.block_numbers(rows)).tolist()]
     terms = StateTerms.from_operators([0], [(0, i, operator) for i, operator in enumerate(operators)], ())
     out, space = np.empty((len(levels), len(operators))), Workspace()
     for positions, stack in wang_stacks([block.basis for block in blocks], terms, len(operators)):

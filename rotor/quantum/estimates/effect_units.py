@@ -61,8 +61,7 @@ def unit_levels(
     """
     if not levels.blocks:
         raise ValueError("levels of a closed form have no blocks; solve them in blocks")
-    starts = np.array([block.start for block in levels.blocks])
-    block_of_row = np.searchsorted(starts, rows, side="right") - 1
+    block_of_row = levels.block_numbers(rows)
     numbers = distinct(block_of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
     units = list(_named_blocks(top, levels, names, blocks, functions, naming, spin_naming))
@@ -78,14 +77,16 @@ def unit_levels(
             return rows_of_block, names[states]
         if functions and block.spins:
             return rows_of_block, _names_by(block, *functions(block))[states]
-        return rows_of_block, quanta[rows[rows_of_block]] if functions or naming else _names(block)[states]
+        if functions or naming:
+            return rows_of_block, quanta[rows[rows_of_block]]
+        return rows_of_block, (_ranks(len(block.energies_mhz)) if block.labels is None else block.labels)[states]
 
     return tracked_blocks(names, units, len(rows), find, values_mhz)
 
 
-def _names(block: SolvedBlock) -> Ints:
-    """Labels of the states of a solved block; only the rank for a single Wang block."""
-    return np.arange(len(block.energies_mhz))[:, None] if block.labels is None else block.labels
+def _ranks(count: int) -> Ints:
+    """The names (n, 1) of states that are labelled by their order in energy."""
+    return np.arange(count)[:, None]
 
 
 def _names_by(block: SolvedBlock, functions: Floats, names: Ints) -> Ints:
@@ -118,7 +119,12 @@ def _named_blocks(
         elif naming:
             yield linear, naming(vertices_of(block), representation)
         elif block.alone:
-            yield linear, NamedFunctions(np.zeros(linear.size, dtype=np.int64), _by_rank, Follows.MOSTLY)
+            yield (
+                linear,
+                NamedFunctions(
+                    np.zeros(linear.size, dtype=np.int64), lambda _, energies, __: _ranks(len(energies)), Follows.MOSTLY
+                ),
+            )
         else:
             yield linear, by_overlaps(vertices_of(block), representation)
 
@@ -148,11 +154,6 @@ def _names_with_spins(block: SpinFunctions) -> NamedFunctions:
     sub_blocks = np.empty(len(order), dtype=np.int64)
     sub_blocks[order] = np.repeat(np.arange(len(sizes)), sizes)
     return NamedFunctions(sub_blocks, namer, Follows.MOSTLY)
-
-
-def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-    """Labels by rank in energy."""
-    return np.arange(len(energies))[:, None]
 
 
 _MOST_ELEMENTS = 1e7  # most elements of vectors of the F that are solved together
