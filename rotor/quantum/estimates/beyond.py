@@ -81,16 +81,10 @@ def known_couplings(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[
 
     present = {effect.name for effect in effects}
     parts = {"nuclear quadrupole": OF_CHI}
-    return [
-        Limit(
-            effect.name, parts.get(effect.name, 1.0) * effect.size_mhz(top, j), f"{_spins_in(effect, top)}: {COMPUTE}"
-        )
-        for effect in spin_effects(top)
-        if effect.name not in present
-    ]
-
-
-def _spins_in(effect: QuantumEffect, top: Top) -> str:
-    """The spins that the terms of an effect name."""
-    names = dict.fromkeys(name for term in effect.spin_terms(top) for name in term.spins)
-    return ", ".join(names)
+    limits = []
+    for effect in spin_effects(top):
+        if effect.name not in present:
+            spins = ", ".join(dict.fromkeys(name for term in effect.spin_terms(top) for name in term.spins))
+            size = parts.get(effect.name, 1.0) * effect.size_mhz(top, j)
+            limits.append(Limit(effect.name, size, f"{spins}: {COMPUTE}"))
+    return limits

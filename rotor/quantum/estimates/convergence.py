@@ -82,13 +82,10 @@ def converges_to(top: Top, jmax: int, effects: Sequence[QuantumEffect] = SEMI_RI
     return _first(top, jmax, None, effects) - 1
 
 
-def _ratios(
-    top: Top, j: int, kmax: int | None, effects: Sequence[QuantumEffect] = SEMI_RIGID
-) -> list[tuple[float, int]]:
+def _ratios(top: Top, j: int, kmax: int | None, effects: Sequence[QuantumEffect]) -> list[tuple[float, int]]:
     """(ratio to the order before, order) of each order above the first; the energy of a state is not an order."""
     sizes = [(order, size) for order, size in order_sizes_mhz(top, j, kmax, effects).items() if order]
-    pairs = pairwise(sizes)
-    return [(size / before if before else 0.0, order) for (_, before), (order, size) in pairs]
+    return [(size / before if before else 0.0, order) for (_, before), (order, size) in pairwise(sizes)]
 
 
 def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
@@ -120,13 +117,12 @@ def _divergence(top: Top, levels: Levels) -> str:
     """Warning about a distortion series that does not converge; empty if it does."""
     j = int(levels.rotational.max(initial=0))
     k = int(np.abs(levels.quanta["k"]).max(initial=0)) if "k" in levels.quanta else None
-    if not j or series_ratio(top, j, k, levels.effects) <= RATIO_LIMIT:
+    ratio, order = max(_ratios(top, j, k, levels.effects), default=(0.0, 0)) if j else (0.0, 0)
+    if ratio <= RATIO_LIMIT:
         return ""
-    ratio, order = max(_ratios(top, j, k, levels.effects))
-    first = _first(top, j, k, levels.effects)
     return (
-        f"the distortion series does not converge at J = {j}: the terms of order J^{order} are up to {ratio:.2g} of the "
-        f"order before (limit {RATIO_LIMIT:g}); energies above J = {first - 1} at the highest K are not to be trusted"
+        f"the distortion series does not converge at J = {j}: the terms of order J^{order} are up to {ratio:.2g} of the order before "
+        f"(limit {RATIO_LIMIT:g}); energies above J = {_first(top, j, k, levels.effects) - 1} at the highest K are not to be trusted"
     )
 
 

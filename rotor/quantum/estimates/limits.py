@@ -33,7 +33,6 @@ from rotor.quantum.estimates.splittings import Splitting, splitting_nuclei
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
-    from rotor.quantum.estimates.internal_rotation import LineShifts
     from rotor.quantum.estimates.methyl_groups import MethylGroup
     from rotor.tops.top import Top
 
@@ -42,15 +41,9 @@ HIGHEST_J = 20  # A - E splittings change little with J; those of higher J are e
 LOW_BARRIER = 10.0  # s = 4 V3/9F; below it torsional levels of E species depend on K as strongly as rotational ones
 ELECTRON_SPIN = "electron spin"
 QUADRUPOLE = "nuclear quadrupole"
-_MULTIPLETS = (
-    "the molecule has unpaired electrons: levels and lines are multiplets, by spin constants such as eps_aa(S)"
-)
 SPIN_LIMITS = frozenset({QUADRUPOLE, "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 # the splittings of NH3 and ND3, see docs/limitations.md and data/molecules
-AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
-    24_000.0,
-    1_600.0,
-)
+AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = 24_000.0, 1_600.0
 
 
 def model_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
@@ -98,14 +91,10 @@ def all_limits(top: Top, j: int, effects: Sequence[QuantumEffect], *, tabulated:
 
 def largest_first(limits: Sequence[Limit]) -> list[Limit]:
     """Limits by decreasing size; those without an estimate last, except for electron spin, which is first."""
-    return sorted(limits, key=_rank)
-
-
-def _rank(limit: Limit) -> float:
-    """Sorting key of a limit."""
-    if limit.size_mhz is None:
-        return -math.inf if limit.name == ELECTRON_SPIN else 0.0
-    return -limit.size_mhz
+    unknown = {ELECTRON_SPIN: math.inf}
+    return sorted(
+        limits, key=lambda limit: -(unknown.get(limit.name, 0.0) if limit.size_mhz is None else limit.size_mhz)
+    )
 
 
 def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Sequence[Limit] = ()) -> dict[str, Any]:
@@ -163,9 +152,8 @@ def _nuclear_limits(
     limits = []
     if absent_sizes(top, effects):
         nuclei = splitting_nuclei(top)
-        known = {
-            nucleus.nucleus.partition("_")[0] for nucleus in nuclei if nucleus.known
-        }  # isotopes, if no atom is named
+        # isotopes, if no atom is named
+        known = {nucleus.nucleus.partition("_")[0] for nucleus in nuclei if nucleus.known}
         others = [nucleus for nucleus in nuclei if not nucleus.known and nucleus.nucleus not in known]
         size = max([shift_mhz, *(abs(nucleus.chi_mhz) for nucleus in others)])
         limits.append(Limit(QUADRUPOLE, size, _split_text(nuclei)))
@@ -210,15 +198,18 @@ def _geometry_limits(top: Top, molecule: Molecule, j: int, present: set[str]) ->
     limits, bonds = [], bonded_atoms(molecule)
     if "internal rotation" not in present and (groups := methyl_groups(molecule, bonds)):
         limits.append(_internal_rotation(top, groups, j))
-    if (nitrogens := _pyramidal_nitrogens(molecule, bonds)) and "interacting states" not in present:
+    if (inversions := _inversions_mhz(molecule, bonds)) and "interacting states" not in present:
         text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
-        limits.append(Limit("inversion", max(_inversion_mhz(molecule, near) for near in nitrogens), text, at_most=True))
+        limits.append(Limit("inversion", max(inversions), text, at_most=True))
     if (bonds_turned := _turning_hydrogens(molecule, bonds)) and "interacting states" not in present:
         text = f"hydrogen turns about {bonds_turned} to an equal position: levels are pairs or more, by rotor torsion --bond"
         limits.append(Limit("torsional tunnelling", None, text))
     electrons = sum(nucleus.element_number for nucleus in molecule.nuclei) - molecule.charge
     if (electrons % 2 or molecule.electronic == "odd") and "spin-rotation" not in present:
-        limits.append(Limit(ELECTRON_SPIN, molecule.electron_spin_mhz, _MULTIPLETS))
+        text = (
+            "the molecule has unpaired electrons: levels and lines are multiplets, by spin constants such as eps_aa(S)"
+        )
+        limits.append(Limit(ELECTRON_SPIN, molecule.electron_spin_mhz, text))
     return limits
 
 
@@ -258,7 +249,10 @@ def _single_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> dict[int, tu
 
 
 def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:
-    """Internal rotation of the group with the lowest V3/F; an upper bound if no barrier of a similar molecule is known."""
+    """Internal rotation of the group with the lowest V3/F; an upper bound if no barrier of a similar molecule is known.
+
+    The size is that of the lines which the larger part of the dipole allows: ΔKa = 0 along a, ΔKa = 1 across it.
+    """
     from rotor.quantum.estimates.internal_rotation import line_shifts
     from rotor.quantum.estimates.methyl_groups import are_computed
 
@@ -268,48 +262,40 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
         text = f"{what} against the rest: lines of A and of E species are apart, by less the higher the barrier"
         return Limit("internal rotation", max(unknown), text, at_most=True)
     least = min(groups, key=lambda group: group.rotor.barrier_mhz / group.rotor.f_mhz)
-    here = min(j, HIGHEST_J)
-    shifts = line_shifts(top.rotational_constants_mhz, least.rotor, here)
-    size, text = _rotor_text(top, what, least, shifts, here)
-    computed = top.kind == "asymmetric" and are_computed(groups)
-    return Limit("internal rotation", size, f"{text}; internal rotation 'geometry' computes it" if computed else text)
-
-
-def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:
-    """Size of the A - E splitting of lines J+1 ← J, and text on the barrier.
-
-    The size is that of the lines which the larger part of the dipole allows: ΔKa = 0 along a, ΔKa = 1 across it.
-    """
-    barrier, rotor = group.barrier, group.rotor
+    barrier, rotor, j = least.barrier, least.rotor, min(j, HIGHEST_J)
+    shifts = line_shifts(top.rotational_constants_mhz, rotor, j)
     lines = {"within one K": shifts.same, "between two K": shifts.other}
     sizes = [(where, float(np.median(np.abs(splittings)))) for where, splittings in lines.items()]
     dipole = np.array(top.dipole_abc_debye or (0.0, 0.0, 0.0))
     if dipole @ dipole > 2 * dipole[0] ** 2:
         sizes.reverse()
-    assert barrier is not None  # without a barrier the caller states a bound
-    assert top.molecule is not None
-    source = f"{barrier.v3_cm:g} cm-1, {barrier.text(top.molecule)}"
-    low = ", so low that no line of the E species fits a rigid top" if rotor.reduced_barrier < LOW_BARRIER else ""
     (first, size), (second, other) = sizes
-    return size, (
+    assert barrier is not None
+    assert top.molecule is not None
+    text = (
         f"{what} against the rest: half of the A and E lines of J = {j} {first} are farther apart, {second} than "
-        f"{_rounded(other, 1)} MHz; barrier {source}{low}"
+        f"{_rounded(other, 1)} MHz; barrier {barrier.v3_cm:g} cm-1, {barrier.text(top.molecule)}"
     )
+    if rotor.reduced_barrier < LOW_BARRIER:
+        text += ", so low that no line of the E species fits a rigid top"
+    if top.kind == "asymmetric" and are_computed(groups):
+        text += "; internal rotation 'geometry' computes it"
+    return Limit("internal rotation", size, text)
 
 
-def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> list[Ints]:
-    """The neighbours of each pyramidal nitrogen with three neighbours, at least two of them hydrogens."""
+def _inversions_mhz(molecule: Molecule, bonds: Sequence[Ints]) -> list[float]:
+    """The splitting of ammonia for each pyramidal nitrogen with three neighbours, at least two of them hydrogens.
+
+    That of ND3 if all neighbours are heavier than protium.
+    """
     from rotor.quantum.estimates.methyl_groups import is_flat
 
-    pyramidal, x = [], molecule.positions_angstrom
+    splittings = []
     for atom, near in enumerate(bonds):
         hydrogens = sum(molecule.symbols[i] == "H" for i in near.tolist())
-        if molecule.symbols[atom] == "N" and len(near) == 3 and hydrogens >= 2 and not is_flat(x, atom, near):
-            pyramidal.append(near)
-    return pyramidal
-
-
-def _inversion_mhz(molecule: Molecule, near: Ints) -> float:
-    """The inversion splitting of NH3, or that of ND3 if all neighbours of the nitrogen are heavier than protium."""
-    heavy = all(molecule.mass_numbers[i] > 1 for i in near.tolist())
-    return HEAVY_AMMONIA_MHZ if heavy else AMMONIA_MHZ
+        if molecule.symbols[atom] != "N" or len(near) != 3 or hydrogens < 2:
+            continue
+        if not is_flat(molecule.positions_angstrom, atom, near):
+            heavy = all(molecule.mass_numbers[i] > 1 for i in near.tolist())
+            splittings.append(HEAVY_AMMONIA_MHZ if heavy else AMMONIA_MHZ)
+    return splittings

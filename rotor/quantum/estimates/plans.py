@@ -1,12 +1,6 @@
 """Plans of levels: effects with their sizes, good quantum numbers, basis, blocks and method, and sizes of effects that levels and lines
 neglect: the next order of distortion, spin couplings, errors of a geometry, internal rotation, inversion, electron spin
-(`rotor.quantum.estimates.limits` and `beyond`), and the Stark shift of a stray field:
-
-| top | shift in 1 V/cm |
-|---|---|
-| linear, J = 0 | (μE)²/6hB, second order |
-| symmetric, J = K = 1 | μE KM/J(J+1), first order |
-| asymmetric, J = M = 1 | shift of two levels that a component couples |
+(`rotor.quantum.estimates.limits` and `beyond`), and the Stark shift of a stray field.
 """
 
 from __future__ import annotations
@@ -82,8 +76,10 @@ MOST_J_COMPARED = {1: 30, 2: 8, 3: 3}  # highest J at which the torsional trunca
 
 def plan_fields(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:
     """Effects, good quantum numbers and neglected effects, as fields of a plan."""
-    left_out = neglected_in_levels(top, j, effects)
-    return {"effects": effect_texts(top, j, effects), "good": good_numbers(top, effects), "left_out": left_out}
+    from rotor.quantum.solve import solve_levels
+
+    good = solve_levels(top, 1, effects=effects, vectors=False).quanta_names
+    return {"effects": effect_texts(top, j, effects), "good": good, "left_out": neglected_in_levels(top, j, effects)}
 
 
 def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
@@ -103,12 +99,8 @@ def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[t
         method = f"Wang blocks one by one, {representation_of(top)}; {ENERGY}"
     parts = [("basis", basis), ("method", method)]
     if (reach := converges_to(top, jmax, effects)) < jmax:
-        parts.append(
-            (
-                "warning",
-                f"the distortion series converges to J = {reach}; energies above at the highest K are not to be trusted",
-            )
-        )
+        text = f"the distortion series converges to J = {reach}; energies above at the highest K are not to be trusted"
+        parts.append(("warning", text))
     if spins:
         size = math.prod(spin.twice + 1 for spin in spins)
         parts.append(("spins", f"blocks of F over the solved rotation, {size} spin functions: {_names(spins)}"))
@@ -125,13 +117,6 @@ def effect_texts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[st
     from rotor.quantum.effect import effect_sizes
 
     return tuple(f"{effect.name}, {effect.size_mhz:.2g} MHz at J = {j}" for effect in effect_sizes(top, j, effects))
-
-
-def good_numbers(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
-    """Quantum numbers that label the levels with these effects."""
-    from rotor.quantum.solve import solve_levels
-
-    return solve_levels(top, 1, effects=effects, vectors=False).quanta_names
 
 
 def torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -> list[tuple[str, str]]:

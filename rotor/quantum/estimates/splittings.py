@@ -19,6 +19,7 @@ unresolved line loses a part of its depth at the centre, `depth_lost`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -84,15 +85,10 @@ def line_components(twice_spin: int, j_upper: int, j_lower: int, k: int) -> tupl
     f, g, spin = twice_f / 2, twice_g / 2, twice_spin / 2
     parts = (twice_f + 1) * (twice_g + 1) * six_j(j_upper, f, spin, g, j_lower, 1) ** 2
     energies = [
-        np.array([_first_order(twice_spin, j, k, number) for number in numbers])
+        np.array([(3 * k**2 / (j * (j + 1)) - 1) * casimir(twice_spin, j, number) if j else 0.0 for number in numbers])
         for j, numbers in ((j_upper, twice_f), (j_lower, twice_g))
     ]
     return energies[0] - energies[1], parts / parts.sum()
-
-
-def _first_order(twice_spin: int, j: int, k: int, twice_f: int) -> float:
-    """Energy of a level in units of χ."""
-    return (3 * k**2 / (j * (j + 1)) - 1) * casimir(twice_spin, j, twice_f) if j else 0.0
 
 
 def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | None, fwhm_mhz: float) -> float:
@@ -116,7 +112,9 @@ def splitting_nuclei(top: Top) -> list[Splitting]:
     splittings, atoms_with_constants = [], set()
     if top.spin_constants is not None:
         for spin, twice in top.spin_constants.twice.items():
-            chi = {name: value for name, value in top.spin_constants.of(spin).items() if _is_tensor_element(name)}
+            constants = top.spin_constants.of(spin)
+            # elements of χ itself, not of its dependence on J or K
+            chi = {name: value for name, value in constants.items() if re.fullmatch(r"chi_[abc-]+", name)}
             if chi and twice > 1:
                 diagonal = np.diag(chi_tensor(chi))
                 splittings.append(_splitting(spin, twice, float(diagonal[np.abs(diagonal).argmax()]), True))
@@ -129,12 +127,6 @@ def splitting_nuclei(top: Top) -> list[Splitting]:
                 labels.setdefault(nucleus.label, _splitting(nucleus.label, round(2 * nucleus.spin), chi_mhz, False))
         splittings += labels.values()
     return sorted(splittings, key=lambda splitting: -splitting.splitting_mhz)
-
-
-def _is_tensor_element(name: str) -> bool:
-    """Whether a constant is an element of χ itself, not of its dependence on J or K."""
-    letters = name.removeprefix("chi_")
-    return name.startswith("chi_") and set(letters) <= set("abc-")
 
 
 def _splitting(nucleus: str, twice: int, chi_mhz: float, is_known: bool) -> Splitting:

@@ -92,16 +92,13 @@ def solve_blocks(
     out = []
     for (block, terms), order, count, (places, _), states in zip(blocks, orders, followed, bases, solved, strict=True):
         energies, vectors, error = states
-        bound = _by_rank(energies, error + left_out_mhz(terms, places, energies, vectors, fields))[:, :count]
+        error = error + left_out_mhz(terms, places, energies, vectors, fields)
+        # a state above, which the rest lowers further, may take the place of a rank
+        bound = np.maximum(error, energies - np.sort(energies - error, axis=1))[:, :count]
         out.append(
             BlockStates(block, block.rows[order[:count]], energies[:, :count], places, vectors[:, :, :count], bound)
         )
     return out
-
-
-def _by_rank(energies: Floats, error: Floats) -> Floats:
-    """Errors (f, s) of the energy of each rank: a state above, which the rest lowers further, may take its place."""
-    return np.maximum(error, energies - np.sort(energies - error, axis=1))
 
 
 def solve_block(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> BlockStates:

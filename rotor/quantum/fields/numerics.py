@@ -37,11 +37,6 @@ def _energies(request: Any) -> Any:
     return np.concatenate([part.energies[:, part.j <= fields.j_highest].ravel() for part in parts])
 
 
-def _smaller_bases(request: Any) -> Iterable[int]:
-    """J max from the least one for the states to that of the request."""
-    return range(request.j_highest + 2, request.jmax + 1)
-
-
 def _basis(
     steps: Callable[[Any], Iterable[int]], measure: Measure, answer: Callable[[Any], Any], used: Callable[[Any], bool]
 ) -> Knob:
@@ -81,13 +76,8 @@ FIELDS = Knob(
 
 def _describe_in_field(acts: str, good: str, within: str, request: Any, cost: Cost) -> dict[str, Any]:
     """What levels in a field are. acts: what acts in the field, with its strength. within: effect that the field contains."""
-    top, j, fields, facts = (
-        request.top,
-        max(request.j_highest, 1),
-        getattr(request, request.map.kind.name),
-        cost.answer.facts(),
-    )
-    described = plan_fields(top, j, request.effects or SEMI_RIGID)
+    fields, facts = getattr(request, request.map.kind.name), cost.answer.facts()
+    described = plan_fields(request.top, max(request.j_highest, 1), request.effects or SEMI_RIGID)
     known_names = {limit.name for limit in described["left_out"]}
     field_limits = [
         LeftOut(limit["name"], limit["size_mhz"], "MHz", limit["text"])
@@ -112,7 +102,12 @@ def _describe_in_field(acts: str, good: str, within: str, request: Any, cost: Co
 ENERGIES = Measure("energy", "MHz", largest_difference)
 STARK = Numerics(
     {"MHz": Goal("energies")},
-    knobs=(_basis(_smaller_bases, ENERGIES, _energies, lambda request: True), FIELDS),
+    knobs=(
+        _basis(
+            lambda request: range(request.j_highest + 2, request.jmax + 1), ENERGIES, _energies, lambda request: True
+        ),
+        FIELDS,
+    ),
     prepare=_with_basis,
     describe=partial(
         _describe_in_field, "dipole in the field, up to {:g} kV/cm", "|M|", "Stark shift of a stray field"
