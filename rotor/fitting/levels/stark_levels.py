@@ -121,7 +121,7 @@ class StarkLevels(LevelModel):
         for i, name in enumerate(self.names):
             if name in DIPOLES:
                 derivative = dipole_derivative(top, DIPOLES.index(name), constants.effects)
-                cosine = block.space.dense(block, derivative)
+                cosine = block.dense(derivative)
                 mean = np.einsum("ln,ln->l", vectors.conj(), vectors @ cosine.T).real
                 slopes[:, i] = -MHZ_PER_DEBYE_KV_PER_CM * group.fields * mean
         slopes[:, columns] = self._constant_slopes(constants, block, vectors, [self.names[i] for i in columns])

@@ -66,11 +66,6 @@ def _treatments(sought: Sought) -> Iterator[Treatment]:
         yield EXACT
 
 
-def _treatment_error(sought: Sought, _: Any, treatment: Treatment) -> Estimate:
-    """The size of spins that are left out; the answer states the error of other treatments."""
-    return Estimate(sought.known["size"] if treatment == LEFT_OUT else 0.0)
-
-
 def _treatment_text(sought: Sought, treatment: Treatment) -> str:
     size = f"{sought.known['size']:.2g} MHz"
     if treatment == LEFT_OUT:
@@ -136,9 +131,8 @@ def distortion(measure: Measure) -> Knob:
         change=lambda request, _, order: replace(request, top=to_order(request.top, order)),
         value=lambda request: _orders(request)[-1],
         fixed=_without_orders,
-        prepare=lambda request: replace(
-            request, top=request.top.with_constants(request.top.constants)
-        ),  # no level table
+        # no level table
+        prepare=lambda request: replace(request, top=request.top.with_constants(request.top.constants)),
         reference=lambda request: request,
         label="order J^{}".format,
     )
@@ -159,7 +153,8 @@ def hyperfine(measure: Measure) -> Knob:
         label=str,
         series=False,
         tried=_treatments,
-        error=_treatment_error,
+        # the answer states the error of other treatments
+        error=lambda sought, _, treatment: Estimate(sought.known["size"] if treatment == LEFT_OUT else 0.0),
         text=_treatment_text,
         refuses=(),
     )
@@ -185,11 +180,9 @@ def _treated(request: Any, _: str, treatment: Treatment) -> Any:
         return request
     tolerance = [treatment.tolerance_mhz] if treatment.tolerance_mhz else []
     effects = effects_of(request.top, treatment != LEFT_OUT, str(treatment), *tolerance)
-    has_distortion = any(isinstance(effect, Centrifugal) for effect in request.effects)
-    return replace(
-        request,
-        effects=tuple(effect for effect in effects if has_distortion or not isinstance(effect, Centrifugal)),
-    )
+    if not any(isinstance(effect, Centrifugal) for effect in request.effects):
+        effects = tuple(effect for effect in effects if not isinstance(effect, Centrifugal))
+    return replace(request, effects=effects)
 
 
 def rounding_of(top: Any, j: int) -> ErrorTerm:

@@ -101,48 +101,31 @@ class MethylGroup:
 
 def methyl_groups(molecule: Molecule, bonds: Sequence[Ints]) -> list[MethylGroup]:
     """CH3 and CD3 with other atoms off their axis, so that they turn against the rest; groups of unlike hydrogens are left out."""
+    from rotor.geometry.inertia import point_masses, principal_frame
+
     x, mass = molecule.positions_angstrom, molecule.masses_u
-    groups: list[tuple[int, list[int], Floats]] = []
+    frame, groups = principal_frame(point_masses(mass, x)), list[MethylGroup]()
     for carbon, near in enumerate(bonds):
         hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
         if molecule.symbols[carbon] != "C" or len(hydrogens) != 3 or np.ptp(mass[hydrogens]):
             continue
-        axis = x[carbon] - x[hydrogens].mean(axis=0)
-        if len(x) > len(hydrogens) + 2 and _any_off_axis(x, [carbon, *hydrogens], axis):
-            groups.append((carbon, hydrogens, axis / np.linalg.norm(axis)))
-    return _with_moments(molecule, bonds, groups) if groups else []
-
-
-def _with_moments(
-    molecule: Molecule, bonds: Sequence[Ints], groups: Sequence[tuple[int, list[int], Floats]]
-) -> list[MethylGroup]:
-    """F, ρ and barrier of groups (carbon, hydrogens, axis)."""
-    from rotor.geometry.inertia import point_masses, principal_frame
-
-    x, mass = molecule.positions_angstrom, molecule.masses_u
-    frame, methyls = principal_frame(point_masses(mass, x)), []
-    for carbon, hydrogens, axis in groups:
         off = x[hydrogens] - x[hydrogens].mean(axis=0)
+        axis = x[carbon] - x[hydrogens].mean(axis=0)
+        if len(x) <= len(hydrogens) + 2 or not _any_off_axis(x, [carbon, *hydrogens], axis):
+            continue
+        axis /= np.linalg.norm(axis)
         off -= np.outer(off @ axis, axis)
         top_moment = float(mass[hydrogens] @ np.sum(off**2, axis=1))
         barrier = barrier_beside(molecule, bonds, carbon)
         height = 0.0 if barrier is None else barrier.v3_cm * MHZ_PER_CM
-        methyls.append(
-            MethylGroup(
-                rotor_of_moments(top_moment, frame.axes @ axis, frame.moments, height), barrier, tuple(hydrogens)
-            )
-        )
-    return methyls
+        rotor = rotor_of_moments(top_moment, frame.axes @ axis, frame.moments, height)
+        groups.append(MethylGroup(rotor, barrier, tuple(hydrogens)))
+    return groups
 
 
 def are_computed(groups: Sequence[MethylGroup]) -> bool:
     """Whether levels can be computed from the geometry: of up to three groups with barriers."""
     return len(groups) <= MOST_TOPS and all(group.rotor.barrier_mhz for group in groups)
-
-
-def axes_of(groups: Sequence[MethylGroup], moments: Sequence[float]) -> Floats:
-    """λ_g I_α (groups, 3) of the axes along a, b, c, from ρ_g = λ_g I_α/I_g and the moments I_g."""
-    return np.array([group.rotor.rho for group in groups]) * moments
 
 
 def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Barrier | None:

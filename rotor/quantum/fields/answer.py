@@ -64,10 +64,25 @@ class MapAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """Error budget of the energies."""
+        """Error budget of the energies in MHz, the largest over all states and fields."""
         top, j, effects = self._hamiltonian
-        data = joined_data(*self.moment_terms(), constants_term(top, effects, j))
-        return map_budget(self.states, [*all_limits(top, j, effects), *self.field_limits()], data)
+        states = self.states
+        return ErrorBudget(
+            of="energies",
+            unit="MHz",
+            rounding=ErrorTerm(
+                float(np.nanmax(states.round_off_mhz, initial=0.0)),
+                "eigenvalues of the largest block in double precision",
+            ),
+            truncation=ErrorTerm(
+                float(np.nanmax(states.truncation_mhz, initial=0.0)),
+                f"functions left out of the basis, J max {states.jmax}",
+                "a smaller tolerance",
+            ),
+            model=model_term([*all_limits(top, j, effects), *self.field_limits()]),
+            data=joined_data(*self.moment_terms(), constants_term(top, effects, j)),
+            statistics=NO_SAMPLES,
+        )
 
     def facts(self) -> Mapping[str, Any]:
         """Everything about the answer but its table of states, by the keys of docs/verbs."""
@@ -107,31 +122,10 @@ def joined_data(*terms: ErrorTerm) -> ErrorTerm:
     'the dipole has no stated uncertainty; constants 4 MHz'
     """
     estimated = sorted((term for term in terms if term.value), key=lambda term: -(term.value or 0.0))
-    not_estimated = [term.source for term in terms if term.value is None]
-    if not_estimated:
-        return ErrorTerm(
-            None, "; ".join([*not_estimated, *(f"{term.source} {term.value:.2g} MHz" for term in estimated)])
-        )
+    if not_estimated := [term.source for term in terms if term.value is None]:
+        sizes = [f"{term.source} {term.value:.2g} MHz" for term in estimated]
+        return ErrorTerm(None, "; ".join([*not_estimated, *sizes]))
     if not estimated:
         return ErrorTerm(0.0, "; ".join(term.source for term in terms) or NO_UNCERTAINTIES)
     value = math.hypot(*(term.value or 0.0 for term in estimated))
     return ErrorTerm(value, "; ".join(term.source for term in estimated), estimated[0].remedy)
-
-
-def map_budget(states: FieldMap, limits: Sequence[Limit], data: ErrorTerm) -> ErrorBudget:
-    """The errors of the energies of a map in MHz, the largest over all states and fields."""
-    return ErrorBudget(
-        of="energies",
-        unit="MHz",
-        rounding=ErrorTerm(
-            float(np.nanmax(states.round_off_mhz, initial=0.0)), "eigenvalues of the largest block in double precision"
-        ),
-        truncation=ErrorTerm(
-            float(np.nanmax(states.truncation_mhz, initial=0.0)),
-            f"functions left out of the basis, J max {states.jmax}",
-            "a smaller tolerance",
-        ),
-        model=model_term(limits),
-        data=data,
-        statistics=NO_SAMPLES,
-    )

@@ -85,7 +85,7 @@ class AxialSpace(FieldSpace):
         k = self.levels.quanta.get("k", np.zeros(len(self.levels), dtype=np.int64))
         return {int(value): np.flatnonzero(k == value) for value in np.unique(k)}
 
-    def dense(self, block: FieldBlock, operator: FieldOperator) -> Floats:
+    def matrix(self, block: FieldBlock, operator: FieldOperator) -> Floats:
         """The operator over the states of a block (n, n), real; a vector has no elements where even and odd J are separate."""
         j, (k,), m, size = block.j, block.members, int(block.m), len(block)
         if isinstance(operator, Magnet):  # g⊥ M + (g∥ - g⊥) k cosθ

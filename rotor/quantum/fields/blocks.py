@@ -241,8 +241,13 @@ class FieldBlock:
         return len(self.rows)
 
     def matrix(self, operator: FieldOperator) -> Any:
-        """The operator over the states (n, n); a sparse one where most elements of many states are 0."""
+        """The operator over the states (n, n), Hermitian; a sparse one where most elements of many states are 0."""
         return self.space.matrix(self, operator)
+
+    def dense(self, operator: FieldOperator) -> NDArray[Any]:
+        """The operator over the states (n, n), Hermitian."""
+        matrix = self.matrix(operator)
+        return np.asarray(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
 
 
 class FieldSpace(ABC):
@@ -268,12 +273,8 @@ class FieldSpace(ABC):
         """Elements of T_q of an operator from the states of a block to those of another (n_up, n_low), q = M' - M."""
 
     @abstractmethod
-    def dense(self, block: FieldBlock, operator: FieldOperator) -> NDArray[Any]:
-        """The operator over the states of a block (n, n), Hermitian."""
-
     def matrix(self, block: FieldBlock, operator: FieldOperator) -> Any:
-        """The operator over the states of a block (n, n); a sparse one where most elements of many states are 0."""
-        return self.dense(block, operator)
+        """See `FieldBlock.matrix`."""
 
     def abs_m(self, block: FieldBlock) -> Ints:
         """|M| of the states of a block (n,)."""

@@ -106,7 +106,14 @@ def chain_states(chains: Sequence[Chain], fields: Floats) -> list[tuple[Floats, 
     beside = np.diagonal(padded, 1, 2, 3).transpose(2, 1, 0)[..., of]
     main, beside = (np.matmul(powers, chain) for chain in (main, beside))  # (n, fields, states)
     vectors = _swept(main, beside, energies, rank, gaps, scale)
-    return None if vectors is None else _apart(chains, energies, vectors)
+    if vectors is None:
+        return None
+    ends = np.cumsum(counts).tolist()
+    places = [slice(end - count, end) for end, count in zip(ends, counts, strict=True)]
+    return [  # without the padding states
+        (energies[:, place], vectors[: len(terms[0]), :, place].transpose(1, 0, 2))
+        for place, (terms, _) in zip(places, chains, strict=True)
+    ]
 
 
 def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Floats, scale: float) -> Floats | None:
@@ -133,16 +140,6 @@ def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Flo
         if not len(moving):
             return vectors.reshape(-1, *shape) if np.isfinite(vectors).all() else None
     return None
-
-
-def _apart(chains: Sequence[Chain], energies: Floats, vectors: Floats) -> list[tuple[Floats, Floats]]:
-    """Energies and vectors of each chain, without the padding states."""
-    ends = np.cumsum([count for _, count in chains])
-    places = [slice(end - count, end) for end, (_, count) in zip(ends.tolist(), chains, strict=True)]
-    return [
-        (energies[:, place], vectors[: len(terms[0]), :, place].transpose(1, 0, 2))
-        for place, (terms, _) in zip(places, chains, strict=True)
-    ]
 
 
 def _padded(chains: Sequence[tuple[Floats, ...]], size: int, strongest: float) -> tuple[Floats, float]:

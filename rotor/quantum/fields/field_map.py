@@ -329,7 +329,7 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
         **diabatic,
     }
     for name, operator in request.observables.items():
-        columns[name] = expectation(over(block.space.dense(block, operator), states.places), vectors)
+        columns[name] = expectation(over(block.dense(operator), states.places), vectors)
     shape = len(fields), len(rows)
     return {name: np.broadcast_to(values, shape).T.ravel() for name, values in columns.items()}
 

@@ -140,7 +140,7 @@ class MapRequest:
         """H_0, H_1, ... of H(x) = Σ x^n H_n over a block (n, n), MHz per power of the unit of the field."""
         out: dict[int, Matrix] = {0: np.diag(block.energies_mhz)}
         for power, mhz, operator in self.terms:
-            matrix = mhz * block.space.dense(block, operator)
+            matrix = mhz * block.dense(operator)
             out[power] = out[power] + matrix if power in out else matrix
         return tuple(out[power] for power in range(len(out)))
 

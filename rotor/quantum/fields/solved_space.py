@@ -209,33 +209,22 @@ class SolvedSpace(FieldSpace):
         signs = np.repeat(np.where(odd, -1, 1), np.diff(self.starts(block)))
         return np.asarray(signs[places][:, None] * vectors.conj())
 
-    def dense(self, block: FieldBlock, operator: FieldOperator) -> NDArray[Any]:
-        """The operator over the states of a block (n, n), real symmetric or complex Hermitian."""
-        placed = list(self._placed_elements(block, operator, block, triangle=True))
-        out = np.diag(np.full(len(block), operator.scalar, np.result_type(float, *(part for _, _, part in placed))))
-        for rows, columns, elements in placed:
-            out[rows, columns] += elements
-            if rows != columns:
-                out[columns, rows] += elements.conj().T
-        return out
-
     def matrix(self, block: FieldBlock, operator: FieldOperator) -> Any:
-        """The operator over the states of a block (n, n); in compressed rows for many states of mixed M."""
-        size = len(block)
+        """The operator over the states of a block, real symmetric or complex Hermitian; in compressed rows for many states of mixed M."""
+        size, placed = len(block), list(self._placed_elements(block, operator, block))
         if self.m_is_good or size <= SPARSE_ABOVE:
-            return self.dense(block, operator)
-        from scipy.sparse import csr_array, eye_array
+            whole = np.diag(np.full(size, operator.scalar, np.result_type(float, *(part for _, _, part in placed))))
+            for rows, columns, elements in placed:
+                whole[rows, columns] += elements
+            return whole
+        from scipy.sparse import csr_array
 
-        pieces: list[tuple[Ints, Ints, Floats]] = []
-        for rows, columns, elements in self._placed_elements(block, operator, block, triangle=True):
+        pieces = [(np.arange(size), np.arange(size), np.full(size, operator.scalar))]
+        for rows, columns, elements in placed:
             i, k = np.nonzero(elements)
             pieces.append((rows.start + i, columns.start + k, elements[i, k]))
-            if rows != columns:
-                pieces.append((columns.start + k, rows.start + i, elements[i, k]))
         places, others, values = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return csr_array((values, (places, others)), shape=(size, size)) + operator.scalar * eye_array(
-            size, format="csr"
-        )
+        return csr_array((values, (places, others)), shape=(size, size))
 
     def between(self, up: FieldBlock, operator: FieldOperator, low: FieldBlock) -> NDArray[Any]:
         """⟨M'|T_q|M⟩ of an operator from the states of a block to those of another (n_up, n_low), q = M' - M."""
@@ -245,11 +234,11 @@ class SolvedSpace(FieldSpace):
         return out
 
     def _placed_elements(
-        self, up: FieldBlock, operator: FieldOperator, low: FieldBlock, triangle: bool = False
+        self, up: FieldBlock, operator: FieldOperator, low: FieldBlock
     ) -> Iterator[tuple[slice, slice, NDArray[Any]]]:
         """Places of a member and of a member of `low`, and the elements between their states with the phases of their colours.
 
-        triangle: only from F to F' ≥ F. All others follow from T_q† = (-1)^q T_-q of Hermitian tensors.
+        From a higher to a lower F they follow from T_q† = (-1)^q T_-q of Hermitian tensors.
         """
         q = (up.twice_m - low.twice_m) // 2
         below, here, there = self.below(operator), self._placed(up), self._placed(low)
@@ -260,7 +249,7 @@ class SolvedSpace(FieldSpace):
                     if elements is not None:
                         (rows, colour), (columns, other) = here[first], there[second]
                         yield rows, columns, _turned(other - colour + odd, elements)
-                if not triangle and first != second and second in here and first in there:
+                if first != second and second in here and first in there:
                     elements = self.elements_between(operator, first, second, up.twice_m, -q)
                     if elements is not None:
                         (rows, colour), (columns, other) = here[second], there[first]

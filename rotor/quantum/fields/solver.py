@@ -214,12 +214,13 @@ def interpolated_states(
                 solve(place)
             continue
         anchors = start + chebyshev_places(fields[start:stop])
-        between = Interpolation(fields, anchors, np.array([solve(place) for place in anchors.tolist()]))
-        failures = 0
+        at_anchors = _in_one_order(np.array([solve(place) for place in anchors.tolist()]))
+        factors, failures = lagrange(fields, fields[anchors]), 0
         for place in range(start, stop):
             if place in full:
                 continue
-            if (states := improved(matrix_at(place), between.at(place), largest_mhz)) is not None:
+            between = np.tensordot(factors[place], at_anchors, 1)
+            if (states := improved(matrix_at(place), between, largest_mhz)) is not None:
                 store(place, states)
                 continue
             solve(place)
@@ -231,28 +232,17 @@ def interpolated_states(
     return energies, vectors, errors
 
 
-class Interpolation:
-    """Interpolated states between full solutions at a few of the rising fields.
-
-    anchors: places of the fields solved in full. vectors (anchors, n, n): their eigenvectors, which are ordered and turned in place.
-    """
-
-    def __init__(self, fields: Floats, anchors: Ints, vectors: Vectors) -> None:
-        for before, here in pairwise(vectors):
-            overlaps = before.conj().T @ here
-            alike = np.abs(overlaps).argmax(axis=1)
-            if len(np.unique(alike)) == len(alike):
-                here[:] = here[:, alike]
-                overlaps = overlaps[:, alike]
-            overlap = np.diagonal(overlaps)
-            here *= (overlap / np.maximum(np.abs(overlap), TINY)).conj()
-        self.vectors, self.factors = vectors, lagrange(fields, fields[anchors])
-
-    def at(self, place: int) -> Vectors:
-        """Normalised vectors (n, n) at a field."""
-        vectors = np.tensordot(self.factors[place], self.vectors, 1)
-        vectors /= np.sqrt(np.einsum("nk,nk->k", vectors.conj(), vectors).real)
-        return np.asarray(vectors)
+def _in_one_order(vectors: Vectors) -> Vectors:
+    """Eigenvectors at rising fields (anchors, n, n), in place in the order of the field before by overlap, and turned to a positive one."""
+    for before, here in pairwise(vectors):
+        overlaps = before.conj().T @ here
+        alike = np.abs(overlaps).argmax(axis=1)
+        if len(np.unique(alike)) == len(alike):
+            here[:] = here[:, alike]
+            overlaps = overlaps[:, alike]
+        overlap = np.diagonal(overlaps)
+        here *= (overlap / np.maximum(np.abs(overlap), TINY)).conj()
+    return vectors
 
 
 def chebyshev_places(fields: Floats) -> Ints:
@@ -264,6 +254,7 @@ def chebyshev_places(fields: Floats) -> Ints:
 
 def improved(matrix: Vectors, vectors: Vectors, largest_mhz: float) -> States | None:
     """Energies, vectors and errors by energy of approximate eigenvectors of a matrix; None if a residual or an overlap is too large."""
+    vectors = vectors / np.sqrt(np.einsum("nk,nk->k", vectors.conj(), vectors).real)
     acted = matrix @ vectors
     energies = np.einsum("nk,nk->k", vectors.conj(), acted).real
     acted -= vectors * energies

@@ -17,7 +17,7 @@ from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.operations import Operation
 from rotor.quantum.bond_torsion import potential_of_scan
-from rotor.quantum.estimates.methyl_groups import MethylGroup, axes_of, methyl_groups
+from rotor.quantum.estimates.methyl_groups import MethylGroup, methyl_groups
 from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION
 from rotor.quantum.reductions import to_representation
 from rotor.tops.internal_rotation import COUNTED, MOST_TOPS, PAIRS, InternalRotationConstants, values_and_settings
@@ -107,7 +107,8 @@ def _kinetic_constants(
     top: Top, groups: Sequence[MethylGroup], numbers: Sequence[str], exchange: Operation | None
 ) -> dict[str, float]:
     """F0 (MHz), delta and, of several groups, epsilon (radians) of each; equal constants of groups that a rotation exchanges."""
-    cosines = axes_of(groups, top.moments_u_angstrom2)
+    # λ_g I_α of the axes, from ρ_g = λ_g I_α/I_g
+    cosines = np.array([group.rotor.rho for group in groups]) * top.moments_u_angstrom2
     if exchange is not None:
         turn = _turn_in_principal_axes(top, exchange)
         first = 0.5 * (cosines[0] + turn @ cosines[1])
