@@ -153,10 +153,10 @@ class RankedLevels(LevelModel):
         energies, slopes = np.empty(self.count + 1), np.empty((self.count + 1, len(self.names)))
         vectors = []
         for part in self.parts:
-            solved, all_vectors = self._solved(part.stack, values_mhz)
+            solved, chosen = self._solved(part, values_mhz)
             energies[part.rows] = np.take_along_axis(solved, part.states, axis=1)
-            slopes[part.rows] = part.stack.slopes(all_vectors, part.states, self._space)
-            vectors.append(np.take_along_axis(all_vectors, part.states[:, None, :], axis=2))
+            slopes[part.rows] = part.stack.slopes(chosen, None, self._space)
+            vectors.append(chosen)
         if len(self._vectors) > 1:
             self._vectors.popitem()  # the last one
         self._vectors[values_mhz.tobytes()] = vectors
@@ -173,13 +173,17 @@ class RankedLevels(LevelModel):
             out[part.rows] = np.einsum("bks,bks->bs", before, after) ** 2
         return out[:-1]
 
-    def _solved(self, stack: LinearStack, values_mhz: Floats) -> tuple[Floats, Floats]:
-        """Energies (blocks, size) and vectors (blocks, size, size) in the order of labels."""
-        energies, vectors, matrices = stack.solved(values_mhz, self._space)
-        if self.rise:
-            turning = turned(self.rise * stack.diagonals(matrices), stack.sizes)
-            order_beyond_the_turn(turning, stack.sizes, energies, vectors)
-        return energies, vectors
+    def _solved(self, part: _Labels, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """Energies (blocks, size) in the order of labels, and vectors (blocks, size, labels)."""
+        stack = part.stack
+        matrices, zero = stack.assembled(values_mhz, self._space)
+        turning = turned(self.rise * stack.diagonals(matrices), stack.sizes)
+        few = None if len(turning[0]) else stack.few_states(part.states, matrices, zero, self._space)
+        if few is not None:
+            return few
+        energies, vectors = stack.all_states(matrices, zero, self._space)
+        order_beyond_the_turn(turning, stack.sizes, energies, vectors)
+        return energies, np.take_along_axis(vectors, part.states[:, None, :], axis=2)
 
     @cached_property
     def _vectors(self) -> dict[bytes, list[Floats]]:

@@ -22,9 +22,15 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, symmetric_from_lower
 from rotor.frozen import dataclass
+from rotor.quantum.twisted import twisted
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 _LARGE, _NARROW = 600, 15  # size, and bandwidths in it, from which the banded solver is faster
+_FEW = 8  # single vectors take less time than all of them where they are at most one in so many
+_LEAST = 20  # smallest size for single vectors
+_CLOSE = 1e-6  # of the largest energy: closer ones would have single vectors with less than nine digits
+_ASIDE = 1e-15  # shift of energies, relative to the largest, so that no pivot is 0
+_RESIDUAL = 1e-12  # largest residual of a single vector, relative to the largest energy and the size
 _LIKE, _SMALL = 1.5, 8  # largest ratio of sizes of blocks that stand side by side, and sizes that all do
 
 
@@ -164,13 +170,19 @@ class LinearStack:
         starts = zip(self.offsets, self.sizes, strict=False)
         return np.concatenate([start + np.arange(n) * (n + 1) for start, n in starts])
 
-    def solved(self, values_mhz: Floats, space: Workspace) -> tuple[Floats, Floats, Floats]:
-        """Energies (blocks, size), NaN beyond a block, vectors (blocks, size, size), 0 beyond a block, and matrices.
+    @cached_property
+    def _below_diagonal(self) -> Ints:
+        """The places of all elements below the diagonals."""
+        starts = zip(self.offsets, self.sizes, strict=False)
+        return np.concatenate([start + n + np.arange(n - 1) * (n + 1) for start, n in starts])
 
-        Matrices are lower triangles one behind the other, see `matrix`. A number is taken off each diagonal for the sake of digits, and
-        added to the energies.
-        """
-        count, size = self.rows.shape[0], self.size
+    @cached_property
+    def _is_tridiagonal(self) -> bool:
+        """Whether all elements are on the diagonal or beside it."""
+        return bool((self.rows - self.columns <= 1).all())
+
+    def assembled(self, values_mhz: Floats, space: Workspace) -> tuple[Floats, Floats]:
+        """Lower triangles one behind the other, and the number (blocks,) that is taken off each diagonal for the sake of digits."""
         values = np.append(values_mhz, 0.0)[self.parameters]
         elements = (self.factors @ (self.mix @ values[:, :, None]))[:, :, 0]
         elements *= self.half
@@ -181,14 +193,49 @@ class LinearStack:
             raise ValueError("a block of the Hamiltonian is not finite with these constants")
         zero = whole[self.offsets[:-1]]
         whole[self._diagonal] -= np.repeat(zero, self.sizes)
-        energies = np.full((count, size), np.nan)
-        vectors = space.array("vectors", count, size, size)
+        return whole, zero
+
+    def solved(self, values_mhz: Floats, space: Workspace) -> tuple[Floats, Floats, Floats]:
+        """Energies (blocks, size), NaN beyond a block, vectors (blocks, size, size), 0 beyond a block, and matrices (`assembled`)."""
+        matrices, zero = self.assembled(values_mhz, space)
+        return *self.all_states(matrices, zero, space), matrices
+
+    def all_states(self, matrices: Floats, zero: Floats, space: Workspace) -> tuple[Floats, Floats]:
+        """Energies (blocks, size), NaN beyond a block, and vectors (blocks, size, size), 0 beyond a block, of `assembled` matrices."""
+        count, size = len(self.sizes), self.size
+        energies, vectors = np.full((count, size), np.nan), space.array("vectors", count, size, size)
         vectors[:, self.runs[0][2] :, :] = vectors[:, :, self.runs[0][2] :] = 0.0
         for first, stop, n in self.runs:
-            matrices = whole[self.offsets[first] : self.offsets[stop]].reshape(stop - first, n, n)
-            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
-        energies += zero[:, None]
-        return energies, vectors, whole
+            whole = matrices[self.offsets[first] : self.offsets[stop]].reshape(-1, n, n)
+            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(whole)
+        return energies + zero[:, None], vectors
+
+    def few_states(
+        self, states: Ints, matrices: Floats, zero: Floats, space: Workspace
+    ) -> tuple[Floats, Floats] | None:
+        """Energies (blocks, size) and vectors (blocks, size, states) of few states (blocks, states) of tridiagonal blocks.
+
+        None for other blocks, for many states, and where neighbouring energies are too close for single vectors.
+        """
+        (count, most), size = states.shape, self.size
+        if not self._is_tridiagonal or max(_FEW * most, _LEAST) > size:
+            return None
+        energies = np.full((count, size), np.nan)
+        for first, stop, n in self.runs:
+            whole = matrices[self.offsets[first] : self.offsets[stop]].reshape(-1, n, n)
+            energies[first:stop, :n] = np.linalg.eigvalsh(whole)
+        largest = np.nanmax(np.abs(energies), axis=1, keepdims=True)
+        if (np.diff(energies, axis=1) <= _CLOSE * largest).any():
+            return None
+        below, inside = np.zeros((count, size)), np.arange(size) < self.sizes[:, None]
+        below[:, 1:][inside[:, 1:]] = matrices[self._below_diagonal]
+        shifted = np.where(inside, self.diagonals(matrices), 4 * largest)[:, :, None]
+        shifted = shifted - (np.take_along_axis(energies, states, axis=1) + _ASIDE * largest)[:, None, :]
+        shifted = shifted.transpose(1, 0, 2).reshape(size, -1)
+        vectors, squares, gamma, _ = twisted(shifted, np.repeat(below.T[1:], most, axis=1), space)
+        if not (np.abs(gamma) <= _RESIDUAL * size * np.repeat(largest, most) * np.sqrt(squares)).all():
+            return None
+        return energies + zero[:, None], vectors.reshape(size, count, most).transpose(1, 0, 2).copy()
 
     def matrix(self, matrices: Floats, place: int) -> Floats:
         """The lower triangle of one block, of all of them one behind the other."""

@@ -35,6 +35,24 @@ def test_labelled_levels_are_the_cores(representation, terms):
     assert np.abs((slopes - expected) / np.abs(expected).max(axis=0)).max() < 1e-13  # the same
 
 
+@pytest.mark.parametrize("axis", ["Ir", "IIIl"])
+def test_single_vectors_of_few_labels_are_those_of_all(monkeypatch, axis):
+    """Tridiagonal blocks with one label each, in which no neighbours are close, need no decomposition with all vectors."""
+    constants = Constants(
+        representation=axis, **RIGID, DeltaJ=1e-4, DeltaJK=2e-4, DeltaK=1e-4, deltaJ=3e-5, deltaK=5e-5
+    )
+    levels = solve_levels(Top(constants), 80)
+    rows = [levels.find(j=j, ka=j // 2, kc=j - j // 2) for j in range(56, 81)]
+    values = np.array([constants[name] for name in constants.values])
+    everything = level_model(constants, labels_of(levels)[levels.quanta["j"] >= 56])
+    energies, slopes = everything.levels(values)
+    places = np.array(rows) - np.flatnonzero(levels.quanta["j"] == 56)[0]
+    monkeypatch.setattr(np.linalg, "eigh", None)
+    few_energies, few_slopes = level_model(constants, labels_of(levels)[rows]).levels(values)
+    assert np.abs(few_energies / energies[places] - 1).max() < 1e-13  # round-off
+    assert np.abs((few_slopes - slopes[places]) / np.abs(slopes).max(axis=0)).max() < 1e-11  # of a gap of 1e-4
+
+
 @pytest.mark.parametrize(
     "constants",
     [

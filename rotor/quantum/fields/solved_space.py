@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Ints
 from rotor.quantum.blocks import coloured_components, connected_parts
 from rotor.quantum.fields.axial import AxialSpace, axial_levels
 from rotor.quantum.fields.blocks import (
@@ -248,8 +248,11 @@ class SolvedSpace(FieldSpace):
                     elements = self.elements_between(operator, first, second, low.twice_m, q)
                     if elements is not None:
                         (rows, colour), (columns, other) = here[first], there[second]
-                        yield rows, columns, _turned(other - colour + odd, elements)
-                if first != second and second in here and first in there:
+                        elements = _turned(other - colour + odd, elements)
+                        yield rows, columns, elements
+                        if up is low and first != second:
+                            yield columns, rows, elements.conj().T
+                if up is not low and first != second and second in here and first in there:
                     elements = self.elements_between(operator, first, second, up.twice_m, -q)
                     if elements is not None:
                         (rows, colour), (columns, other) = here[second], there[first]
