@@ -17,7 +17,7 @@ from rotor.requests.budget import ErrorBudget, ErrorTerm
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
-    from rotor.quantum.estimates.beyond import Limit
+    from rotor.quantum.estimates.limits import Limit
 
 
 def cosines_budget(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorBudget:

@@ -11,7 +11,7 @@ For zero total angular momentum, ω = -I⁻¹ c α', and the kinetic energy is �
     I_r = I_α - cᵀ I⁻¹ c = det K / det I = 1 / (K⁻¹)_αα.
 
 Derived here. For one group on a rigid frame it is the reduced moment of K. S. Pitzer, J. Chem. Phys. 14 (1946) 239, as later authors
-cite it; for a symmetric group it is r I_α with r = 1 - Σ λ_g² I_α/I_g (`rotor.quantum.estimates.internal_rotation`).
+cite it; for a symmetric group it is r I_α with r = 1 - Σ λ_g² I_α/I_g (`rotor.quantum.estimates.methyl_groups`).
 """
 
 from __future__ import annotations

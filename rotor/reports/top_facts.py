@@ -94,7 +94,7 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     content = report.content
     if "limits" not in content:
         return [*error_facts(content.get("errors")), *listed("left out", content.get("left_out", ()))]
-    from rotor.quantum.estimates.beyond import Limit
+    from rotor.quantum.estimates.limits import Limit
     from rotor.requests.plan import left_out_texts
 
     present = [f"{effect['name']} {effect['size_mhz']:.2g} MHz" for effect in content["effects"] if effect["present"]]

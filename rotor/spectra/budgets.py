@@ -13,7 +13,7 @@ from rotor.requests.budget import ErrorBudget, ErrorTerm
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
-    from rotor.quantum.estimates.beyond import Limit
+    from rotor.quantum.estimates.limits import Limit
     from rotor.quantum.levels import Levels
 
 STRONG = 0.1  # of the strongest line: weaker lines do not count for the error from the constants

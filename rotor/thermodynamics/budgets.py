@@ -29,7 +29,7 @@ from rotor.thermodynamics.functions import GAS_CONSTANT
 from rotor.units import MHZ_PER_K
 
 if TYPE_CHECKING:
-    from rotor.quantum.estimates.beyond import Limit
+    from rotor.quantum.estimates.limits import Limit
     from rotor.thermodynamics.functions import ThermoFunctions
     from rotor.tops.top import Top
 

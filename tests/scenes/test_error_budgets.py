@@ -14,8 +14,8 @@ from rotor.classical.free.free_motion import free_motion
 from rotor.classical.tumble import TumbleRequest, answer_tumble
 from rotor.geometry.rotations import distance
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import model_term
+from rotor.quantum.estimates.limits import Limit
 from rotor.quantum.estimates.splittings import line_components
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm

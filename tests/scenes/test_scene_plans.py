@@ -12,7 +12,7 @@ from places import PROJECT
 import rotor
 from rotor.quantum.effects.of_top import spin_effects
 from rotor.quantum.effects.watson import SEMI_RIGID, operators_by_name
-from rotor.quantum.estimates.beyond import next_order
+from rotor.quantum.estimates.limits import next_order
 from rotor.quantum.estimates.plans import neglected_in_levels, stray_field
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of

@@ -28,7 +28,7 @@ from rotor import units
 from rotor.checks import require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.beyond import Limit
+from rotor.quantum.estimates.limits import Limit
 from rotor.quantum.fields.answer import MapAnswer
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.field_map import FieldMap, field_map

@@ -28,7 +28,7 @@ from rotor.molecules.nuclei import isotope
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import DEFAULT_TOLERANCE_MHZ, HIGHEST_J, Z, projections
-from rotor.quantum.estimates.beyond import Limit
+from rotor.quantum.estimates.limits import Limit
 from rotor.quantum.fields.answer import MapAnswer
 from rotor.quantum.fields.blocks import Contraction, Magnet
 from rotor.quantum.fields.field_map import FieldMap, field_map

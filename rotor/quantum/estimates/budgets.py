@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.estimates.beyond import ESTIMATED, ZERO_POINT, Limit
 from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.estimates.limits import ESTIMATED, ZERO_POINT, Limit
 from rotor.quantum.hyperfine_method import used_method
 from rotor.quantum.levels import Levels
 from rotor.quantum.tabulated import tabulated_level_errors

@@ -1,4 +1,5 @@
-"""Effects that a model of rotation neglects although the molecule shows signs of them, with estimated sizes.
+"""Effects that a model of rotation neglects, with estimated sizes: the next order of distortion, known spin couplings, and what the
+molecule shows signs of:
 
 | sign | effect | size |
 |---|---|---|
@@ -14,6 +15,11 @@
 D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phys. 3 (1920) 289). ν = 1150 cm⁻¹ (B/cm⁻¹)^0.3 was chosen on the
 library: it reproduces 40 of 41 D_J or ΔJ within a factor of 3 (tests/quantum/estimates/test_limits.py; the exception is glycolaldehyde).
 A free group has the levels F m², with m = 0 for A and m = ±1 for E species, F apart.
+
+The next order is extrapolated as a geometric series, c s_n²/s_(n-1), from the sizes s of the last two orders at one J (`order_sizes_mhz`).
+From the quartic to the sextic order c = 0.3 for linear tops and 3 for others; c = 1 for all higher orders. A harmonic diatomic molecule has
+c = 2, most of which anharmonicity cancels (Dunham's H = 2D(12B² - αω)/3ω²). The values were chosen on the library, where they hold within a
+factor of 3 for 25 of 30 orders (tests/scenes/test_scene_plans.py names the others).
 """
 
 from __future__ import annotations
@@ -27,15 +33,20 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Ints
+from rotor.frozen import dataclass
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
-from rotor.quantum.estimates.beyond import COMPUTE, ZERO_POINT, Limit, known_couplings, next_order
 from rotor.quantum.estimates.splittings import Splitting, splitting_nuclei
+from rotor.requests.budget import two_digits
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.quantum.estimates.methyl_groups import MethylGroup
     from rotor.tops.top import Top
 
+FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c
+COMPUTE = "its constants are known, add the effects of spins"  # reports replace this by the option
+ZERO_POINT, ESTIMATED = "vibration-rotation difference", "errors of the estimated constants"
+OF_CHI = 0.5  # largest shift relative to χ: χ/2 for J = 1 with I = 1, χ/4 for higher J
 VIBRATION_CM, VIBRATION_POWER = 1150.0, 0.3  # ν = 1150 (B/cm⁻¹)^0.3 cm⁻¹, for distortion that was not computed
 HIGHEST_J = 20  # A - E splittings change little with J; those of higher J are estimated at this J
 LOW_BARRIER = 10.0  # s = 4 V3/9F; below it torsional levels of E species depend on K as strongly as rotational ones
@@ -44,6 +55,32 @@ QUADRUPOLE = "nuclear quadrupole"
 SPIN_LIMITS = frozenset({QUADRUPOLE, "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 # the splittings of NH3 and ND3, see docs/limitations.md and data/molecules
 AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = 24_000.0, 1_600.0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A neglected effect.
+
+    size_mhz: for a line at the highest J; None if not estimated. at_most: whether the size is an upper bound. levels: J and K for which
+    the size holds, where it grows fast with them.
+    """
+
+    name: str
+    size_mhz: float | None
+    text: str
+    at_most: bool = False
+    levels: str = ""
+
+    @property
+    def size(self) -> float | None:
+        """The size in MHz, as that of `rotor.requests.plan.LeftOut`."""
+        return self.size_mhz
+
+    def sentence(self, with_spins: str = COMPUTE) -> str:
+        """Name, size and consequence, as reports print them. with_spins: how the effects of spins are added."""
+        estimate = "not estimated" if self.size_mhz is None else f"about {two_digits(self.size_mhz)} MHz"
+        size = f"at most {estimate}" if self.at_most else estimate
+        return f"{self.name}: {size}; {self.text.replace(COMPUTE, with_spins)}"
 
 
 def model_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
@@ -80,13 +117,53 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
 
 
 def all_limits(top: Top, j: int, effects: Sequence[QuantumEffect], *, tabulated: bool = False) -> list[Limit]:
-    """`model_limits` with the effects that follow from the constants, however small (`rotor.quantum.estimates.beyond`).
+    """`model_limits` with the effects that follow from the constants, however small.
 
     tabulated: all energies are from the table of the top, so that the distortion series does not matter.
     """
     further = None if tabulated else next_order(top, j, effects)
     limits = model_limits(top, j, effects)
     return limits if further is None else largest_first([*limits, further])
+
+
+def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> Limit | None:
+    """The order of distortion beyond the highest of the calculation; None for rigid constants.
+
+    >>> from rotor.quantum.effects.watson import SEMI_RIGID
+    >>> from rotor.tops.top import Top
+    >>> sextic = next_order(Top.from_constants("B=6000 D=0.001 MHz"), 20, SEMI_RIGID)
+    >>> f"{sextic.size_mhz:.2e}"  # 0.3 D²/B (J(J+1))³
+    '3.70e-03'
+    """
+    from rotor.quantum.estimates.convergence import order_sizes_mhz
+
+    sizes = list(order_sizes_mhz(top, j, effects=effects).items())
+    if len(sizes) < 2 or not sizes[-2][1]:
+        return None
+    (_, before), (order, last) = sizes[-2:]
+    which = "higher" if order > 4 else "linear" if top.kind == "linear" else "other"
+    text = f"{FACTORS[which]:g} times the order J^{order} ({last:.2g} MHz) squared over the order before"
+    levels = f"J = {j}" if top.kind == "linear" else f"J = {j}, K up to {j}"
+    return Limit(
+        f"centrifugal distortion of order J^{order + 2}", FACTORS[which] * last**2 / before, text, levels=levels
+    )
+
+
+def known_couplings(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
+    """Spin couplings with known constants that the calculation neglects."""
+    if top.spin_constants is None:
+        return []
+    from rotor.quantum.effects.of_top import spin_effects
+
+    present = {effect.name for effect in effects}
+    parts = {"nuclear quadrupole": OF_CHI}
+    limits = []
+    for effect in spin_effects(top):
+        if effect.name not in present:
+            spins = ", ".join(dict.fromkeys(name for term in effect.spin_terms(top) for name in term.spins))
+            size = parts.get(effect.name, 1.0) * effect.size_mhz(top, j)
+            limits.append(Limit(effect.name, size, f"{spins}: {COMPUTE}"))
+    return limits
 
 
 def largest_first(limits: Sequence[Limit]) -> list[Limit]:
@@ -253,8 +330,7 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
 
     The size is that of the lines which the larger part of the dipole allows: ΔKa = 0 along a, ΔKa = 1 across it.
     """
-    from rotor.quantum.estimates.internal_rotation import line_shifts
-    from rotor.quantum.estimates.methyl_groups import are_computed
+    from rotor.quantum.estimates.methyl_groups import are_computed, line_shifts
 
     what = "a methyl group turns" if len(groups) == 1 else f"{len(groups)} methyl groups turn"
     unknown = [group.rotor.f_mhz for group in groups if group.barrier is None]
@@ -276,7 +352,7 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
         f"{what} against the rest: half of the A and E lines of J = {j} {first} are farther apart, {second} than "
         f"{_rounded(other, 1)} MHz; barrier {barrier.v3_cm:g} cm-1, {barrier.text(top.molecule)}"
     )
-    if rotor.reduced_barrier < LOW_BARRIER:
+    if 4 * rotor.barrier_mhz / (9 * rotor.f_mhz) < LOW_BARRIER:
         text += ", so low that no line of the E species fits a rigid top"
     if top.kind == "asymmetric" and are_computed(groups):
         text += "; internal rotation 'geometry' computes it"

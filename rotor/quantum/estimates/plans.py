@@ -24,8 +24,7 @@ HYPERFINE_KEY = "its constants are known, effects.hyperfine = true adds them"
 
 def neglected_in_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[LeftOut, ...]:
     """Neglected effects of levels and lines of one J in MHz, largest first; effects without an estimate come last."""
-    from rotor.quantum.estimates.beyond import COMPUTE
-    from rotor.quantum.estimates.limits import all_limits
+    from rotor.quantum.estimates.limits import COMPUTE, all_limits
 
     limits = all_limits(top, j, effects)
     parts = [
@@ -103,13 +102,9 @@ def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[t
         parts.append(("warning", text))
     if spins:
         size = math.prod(spin.twice + 1 for spin in spins)
-        parts.append(("spins", f"blocks of F over the solved rotation, {size} spin functions: {_names(spins)}"))
+        names = ", ".join(dict.fromkeys(spin.name for spin in spins))
+        parts.append(("spins", f"blocks of F over the solved rotation, {size} spin functions: {names}"))
     return parts
-
-
-def _names(spins: Sequence[Any]) -> str:
-    """Names of spins, each once."""
-    return ", ".join(dict.fromkeys(spin.name for spin in spins))
 
 
 def effect_texts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:

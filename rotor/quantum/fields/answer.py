@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import (
     NO_SAMPLES,
     NO_UNCERTAINTIES,
@@ -23,7 +22,7 @@ from rotor.quantum.estimates.budgets import (
     parameter_names,
     source_of_errors,
 )
-from rotor.quantum.estimates.limits import all_limits, limit_facts
+from rotor.quantum.estimates.limits import Limit, all_limits, limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.solve import solve_levels
 from rotor.requests.budget import ErrorBudget, ErrorTerm

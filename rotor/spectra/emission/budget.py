@@ -21,9 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor import units
-from rotor.quantum.estimates.beyond import ESTIMATED, Limit
 from rotor.quantum.estimates.budgets import NO_SAMPLES, model_term
-from rotor.quantum.estimates.limits import ELECTRON_SPIN, QUADRUPOLE, all_limits
+from rotor.quantum.estimates.limits import ELECTRON_SPIN, ESTIMATED, QUADRUPOLE, Limit, all_limits
 from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.spectra.emission.emission import KM_PER_S, contrast_k

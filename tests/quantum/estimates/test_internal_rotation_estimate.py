@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotor import units
-from rotor.quantum.estimates.internal_rotation import line_shifts, rotor_of_moments
+from rotor.quantum.estimates.methyl_groups import line_shifts, rotor_of_moments
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.terms import Axes
 
