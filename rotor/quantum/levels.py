@@ -23,7 +23,6 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.quantum.internal_rotation.levels import TorsionMoments
     from rotor.tops.top import Top
 
 
@@ -56,7 +55,7 @@ class SolvedBlock:
     those of the rotation beside spins have the names of these too, those of a species are its states there. start: place of the first
     state in the arrays of `Levels`. labels: of states of coupled blocks v, Ka, Kc (n, 3); with spins v (of a species the row of a level),
     Ka (K if axial), Kc and the doubled pattern N, J ... F, (n, 3 + pattern). mixing: (n,) squared overlaps with the functions that name
-    them. moments: of a species without spins, which has its own; components: 2 where its
+    them. moments: `TorsionMoments` of a species without spins, else None; components: 2 where its
     states σ and -σ coincide. spins: the functions of a block of one F (`spins.blocks.SpinFunctions`), which has no other parts. Functions
     of a coupled block carry the factor of `wang.basis.phase`, those of a Wang block without labels do not.
     """
@@ -67,7 +66,7 @@ class SolvedBlock:
     start: int = 0
     labels: Ints | None = None
     mixing: Floats | None = None
-    moments: TorsionMoments | None = None
+    moments: Any = None
     components: int = 1
     spins: Any = None
 

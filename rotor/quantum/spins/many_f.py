@@ -294,7 +294,7 @@ class Between(NamedTuple):
         """Σ c X V (blocks, columns', states', n) of vectors (blocks, columns, states, n)."""
         (count, rows, states), n = self.elements.shape, vectors.shape[3]
         moved = np.matmul(self.elements[:, None], vectors[:, self.right.columns, :states])
-        return np.matmul(self.coefficients, moved.reshape(count, -1, rows * n)).reshape(count, -1, rows, n)
+        return np.asarray(self.coefficients @ moved.reshape(count, -1, rows * n)).reshape(count, -1, rows, n)
 
 
 def between(

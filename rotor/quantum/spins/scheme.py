@@ -33,7 +33,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import field, replace
 from functools import lru_cache
 from itertools import accumulate
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -46,7 +46,6 @@ from rotor.quantum.wang.basis import SpeciesFactors
 from rotor.tops.constants.operators import Powers
 
 if TYPE_CHECKING:
-    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 
@@ -386,7 +385,17 @@ class Scheme:
         raise ValueError(f"spin {name}: the spins here are {', '.join(spin.name for spin in self.spins) or 'none'}")
 
 
-def scheme_of(top: Top, effects: Sequence[QuantumEffect]) -> Scheme:
+class DeclaresSpins(Protocol):
+    """An effect as the coupling scheme sees it: `QuantumEffect`, without an import of that module, which imports this one."""
+
+    def spins(self, top: Top) -> tuple[Spin, ...]:
+        """Spins of the effect."""
+
+    def conserved_sums(self, top: Top) -> frozenset[str]:
+        """Names of sums that count as good quantum numbers."""
+
+
+def scheme_of(top: Top, effects: Sequence[DeclaresSpins]) -> Scheme:
     """The spins of all effects, each once, electrons first; ValueError if two effects differ in the size of a spin."""
     spins: dict[str, Spin] = {}
     for spin in (spin for effect in effects for spin in effect.spins(top)):
