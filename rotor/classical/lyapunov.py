@@ -44,7 +44,7 @@ class Flow:
 
     def state_rate(self, time: float, y: Floats) -> Floats:
         """The rate (d,) of a single state."""
-        return self.rate(time, y[None])[0]
+        return np.asarray(self.rate(time, y[None])[0])
 
     def slopes(self, time: float, y: Floats) -> Floats:
         """The Jacobian ∂rate_i/∂y_j at states (k, d)."""

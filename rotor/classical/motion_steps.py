@@ -23,10 +23,7 @@ MOST_STEPS = 10**10  # that a motion can take, hours of compiled steps
 TIMED_STEPS = 1000  # beyond those that are made one by one
 MORE_COMPILED, MORE_PLAIN = 50, 2  # times as many for a second part that is timed: compiled steps are so much cheaper
 # of half a first part, and times as many in the other half, from which a trend is read
-ENOUGH_STEPS, CLEARLY = (
-    200,
-    1.5,
-)
+ENOUGH_STEPS, CLEARLY = 200, 1.5
 
 
 def beginning(request: DrivenRequest, share: float, *more: float) -> DrivenRequest:

@@ -18,10 +18,7 @@ from rotor.classical.integrators.method import Motion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 
 # most steps of a motion that is repeated for an estimate: compiled, and step by step
-MOST_STEPS, MOST_CALLED = (
-    20_000,
-    500,
-)
+MOST_STEPS, MOST_CALLED = 20_000, 500
 FINEST = 1e-14  # a tolerance
 MORE_STEPS, USUAL_STEPS = 1.5, 2.4  # of a finer motion, times those of the coarse one: 10^(2/8) = 1.8 is usual
 # a reference a hundred times finer has at most a fifth of the error (largest of 1,000 motions: 13 %)
@@ -30,10 +27,7 @@ DENSE = 4  # steps between two times, below which these set the length of many s
 # of steps a quarter as long: 1/(1 - 4^-p) for order p, 1.07 of order 2, with a margin where steps are long
 OF_QUARTER = 1.3
 # a quarter of a step longer than the spacing of the times may give the same steps
-QUARTERS, TRIPLED = (
-    [4.0**k for k in range(1, 40)],
-    3,
-)
+QUARTERS, TRIPLED = [4.0**k for k in range(1, 40)], 3
 EVALUATED = 8 * sys.float_info.epsilon  # of a step
 OF_REMEDY = "an accuracy, which is compared with a finer motion,"
 

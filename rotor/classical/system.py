@@ -198,11 +198,12 @@ def _diagonal(values: Floats) -> Floats:
 
 
 def acting_inverse(moments: Floats) -> Floats:
-    """1/I_i for integrators; the zero moment of a linear rotor is replaced by the other one.
+    """1/I_i for integrators; the zero moment of a linear rotor is replaced by the other one; 0 for an atom.
 
     Without momentum about its axis a linear rotor moves exactly like a sphere of that moment: L is constant in the body, and the body
     rotates about it.
     """
     largest = np.max(moments, axis=-1, keepdims=True)
     # an axis without inertia: any finite number, as its momentum is 0
-    return np.ascontiguousarray(1.0 / np.where(moments == 0.0, largest, moments))
+    acting = np.where(moments == 0.0, largest, moments)
+    return np.ascontiguousarray(np.divide(1.0, acting, out=np.zeros_like(acting), where=acting > 0.0))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.statistics.equipartition import products_over_starts
 from rotor.table import Table
 
 YEH_HUMMER_XI = 2.837297  # of a cubic cell; I.-C. Yeh and G. Hummer, J. Phys. Chem. B 108, 15873 (2004), below eq. 12
@@ -98,16 +99,13 @@ def mean_square_displacement(path: ArrayLike) -> Floats:
     >>> mean_square_displacement(np.arange(4.0)[:, None, None] * [[[1.0, 0.0, 0.0]]]).round(12).tolist()
     [0.0, 1.0, 4.0, 9.0]
     """
-    from scipy.fft import irfft, next_fast_len, rfft
-
     points = _path(path)
     points = points - points.mean(axis=0)
     frames = len(points)
     starts = frames - np.arange(frames)
     squares = np.sum(points**2, axis=(1, 2))
     before, after = np.cumsum(squares)[::-1], np.cumsum(squares[::-1])[::-1]
-    power = np.sum(np.abs(rfft(points, next_fast_len(2 * frames), axis=0)) ** 2, axis=(1, 2))
-    products = irfft(power, next_fast_len(2 * frames))[:frames]
+    products = products_over_starts(points.reshape(frames, -1))
     return np.asarray((before + after - 2 * products) / (starts * points.shape[1])).clip(min=0.0)
 
 

@@ -20,6 +20,7 @@ from rotor.arrays import Floats
 from rotor.fluids.analysis import diffusion
 from rotor.fluids.summary import Mean
 from rotor.geometry import rotations
+from rotor.statistics.equipartition import products_over_starts
 
 if TYPE_CHECKING:
     from rotor.fluids.forces.models import RigidModel
@@ -182,15 +183,11 @@ def correlation_time(vectors: Floats, interval: float, order: int) -> float:
 
 def reorientation(vectors: Floats, order: int) -> Floats:
     """C_l(t) (frames,) of unit vectors (frames, n, 3), averaged over vectors and starts; P_2(u·u') = 3/2 Σ Q Q', Q = uu - 1/3."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
     if order == 1:
         series, scale = vectors, 1.0
     else:
         series = (vectors[..., :, None] * vectors[..., None, :] - np.eye(3) / 3).reshape(*vectors.shape[:2], 9)
         scale = 1.5
     frames, bodies = series.shape[:2]
-    size = next_fast_len(2 * frames)
-    power = sum(np.sum(np.abs(rfft(series[..., k], size, axis=0)) ** 2, axis=1) for k in range(series.shape[-1]))
-    sums = irfft(power, size)[:frames]
-    return np.asarray(scale * sums / ((frames - np.arange(frames)) * bodies))
+    products = sum(products_over_starts(series[..., k]) for k in range(series.shape[-1]))
+    return np.asarray(scale * products / ((frames - np.arange(frames)) * bodies))

@@ -317,6 +317,18 @@ def _ratio_mean(name: str, ratios: Floats, count: float) -> _Mean:
     )
 
 
+def products_over_starts(series: Floats) -> Floats:
+    """Σ x(t₀) x(t₀ + t) of series (frames, n) over starts t₀ and columns, (frames,), by fast Fourier transform.
+
+    >>> products_over_starts(np.array([[1.0], [2.0], [3.0]])).round(12).tolist()
+    [14.0, 8.0, 3.0]
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    size = next_fast_len(2 * len(series))
+    return np.asarray(irfft(np.sum(np.abs(rfft(series, size, axis=0)) ** 2, axis=1), size)[: len(series)])
+
+
 def statistical_inefficiency(series: ArrayLike, mean: float | None = None, variance: float | None = None) -> float:
     """g = 1 + 2 Σ ρ(t) of series (frames, n), correlations averaged over the n columns; at least 1.
 
@@ -327,13 +339,10 @@ def statistical_inefficiency(series: ArrayLike, mean: float | None = None, varia
     >>> 0.9 < statistical_inefficiency(rng.normal(size=(20000, 1))) < 1.1
     True
     """
-    from scipy.fft import irfft, next_fast_len, rfft
-
     x = np.asarray(series, dtype=np.float64)
     x = x - (x.mean(axis=0) if mean is None else mean)
     frames = len(x)
-    power = np.abs(rfft(x, next_fast_len(2 * frames), axis=0)) ** 2
-    correlation = irfft(power.mean(axis=1), next_fast_len(2 * frames))[:frames] / (frames - np.arange(frames))
+    correlation = products_over_starts(x) / (x.shape[1] * (frames - np.arange(frames)))
     scale = correlation[0] if variance is None else variance
     if not scale > 0.0:
         return float(frames)  # constant series

@@ -97,6 +97,7 @@ class DoubleDouble:
         return DoubleDouble(self.hi * power_of_two, self.lo * power_of_two)
 
 
+PASSES = 4  # of `exact_sum`, each for about 16 digits
 PI = DoubleDouble(np.array(np.pi), np.array(1.2246467991473532e-16))  # the second double is π less the first
 
 
@@ -113,13 +114,13 @@ def products(*factors: DoubleDouble) -> list[Floats]:
     return terms
 
 
-def exact_sum(terms: list[Floats], passes: int = 4) -> DoubleDouble:
-    """Σ terms to 31 digits of the *result*, however much cancels (up to about `passes` times 16 digits).
+def exact_sum(terms: list[Floats]) -> DoubleDouble:
+    """Σ terms to 31 digits of the *result*, however much cancels (up to about 64 digits).
 
     Each pass preserves the exact sum and concentrates it in the last term (VecSum of Ogita, Rump and Oishi).
     """
     vector = [np.asarray(term, dtype=np.float64) for term in terms]
-    for _ in range(passes):
+    for _ in range(PASSES):
         for i in range(1, len(vector)):
             vector[i], vector[i - 1] = two_sum(vector[i], vector[i - 1])
     total = DoubleDouble.exact(vector[0])

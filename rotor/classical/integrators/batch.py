@@ -79,10 +79,7 @@ def propagate(
     """
     from rotor.classical.integrators._kernels import LANES, advance_blocks
 
-    moments = checked_moments(moments)
-    momentum = np.ascontiguousarray(checked_momentum(momentum, moments))
-    if momentum.ndim != 2:
-        raise ValueError(f"the momenta of many tops have shape (n, 3); got {momentum.shape}")
+    moments, momentum = checked_bodies(moments, momentum)
     if steps < 0:
         raise ValueError(f"number of steps: expected 0 or more; got {steps} (a negative step goes back in time)")
     n = len(momentum)
@@ -94,6 +91,15 @@ def propagate(
         return out
     over_blocks(advance_blocks, -(-n // LANES), (step, steps, rates, axes, (momentum, attitude), out), executor)
     return out
+
+
+def checked_bodies(moments: ArrayLike, momentum: ArrayLike) -> tuple[Floats, Floats]:
+    """Moments (n, 3) or (3,) and momenta (n, 3) of many bodies, or a ValueError."""
+    checked = checked_moments(moments)
+    momenta = np.ascontiguousarray(checked_momentum(momentum, checked))
+    if momenta.ndim != 2:
+        raise ValueError(f"the momenta of many bodies have shape (n, 3); got {momenta.shape}")
+    return checked, momenta
 
 
 def over_blocks(kernel: Any, blocks: int, arguments: tuple[Any, ...], executor: ThreadPoolExecutor | None) -> None:

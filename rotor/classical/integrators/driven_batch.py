@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 from rotor.classical.effect import ClassicalEffect
-from rotor.classical.euler import checked_moments, checked_momentum
-from rotor.classical.integrators.batch import over_blocks, rates_and_axes
+from rotor.classical.integrators.batch import checked_bodies, over_blocks, rates_and_axes
 from rotor.classical.system import System, flatten_system
 from rotor.classical.torque_form import BODY_FIXED, INDUCED, LEVER, TURNING, SystemForm
 from rotor.geometry.rotations import normalised, to_matrix
@@ -37,22 +36,12 @@ def propagate_driven(
 
     Parameters
     ----------
-    moments : (n, 3) or (3,) array
-        Principal moments.
-    momentum : (n, 3) array
-        In body axes.
-    attitude : (n, 4) or (4,) array
-        Body to space.
-    step : float
-        May be negative. None of the three turns of a step may be wider than ½ rad for any body.
-    steps : int
-        Number of steps.
+    moments, momentum, attitude, step, steps, executor
+        As for `propagate`; none of the three turns of a step may be wider than ½ rad for any body.
     effects : sequence of ClassicalEffect
         Torques of attitude and time with a compiled form; the same on every body.
     time : float
         At the start, for drives.
-    executor : ThreadPoolExecutor, optional
-        Its threads share the bodies (the compiled loop releases the interpreter lock).
 
     Returns
     -------
@@ -76,10 +65,7 @@ def propagate_driven(
     from rotor.classical.integrators._field_kernels import advance_in_field
     from rotor.classical.integrators._kernels import LANES, WIDEST_TURN
 
-    body = checked_moments(moments)
-    momentum = checked_momentum(momentum, body)
-    if momentum.ndim != 2:
-        raise ValueError(f"the momenta of many bodies have shape (n, 3); got {momentum.shape}")
+    body, momentum = checked_bodies(moments, momentum)
     if steps < 1:
         raise ValueError(f"expected at least one step; got {steps} (to go back, give a negative step)")
     form = _served(flatten_system(body, effects))

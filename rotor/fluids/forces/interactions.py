@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -128,12 +129,10 @@ def tail(
     of each model; width_angstrom: of the switch before the cutoff.
     """
     energy = pressure = 0.0
-    for first, n in zip(models, numbers, strict=True):
-        for second, m in zip(models, numbers, strict=True):
-            for s in range(len(first.sites)):
-                for t in range(len(second.sites)):
-                    _, c12, c6 = _numbers(first, second, s, t)
-                    tail_energy, two = _beyond(c12, c6, cutoff_angstrom, width_angstrom)
-                    energy += 2 * math.pi * n * m * tail_energy
-                    pressure += 2 * math.pi * n * m * two
+    tables = pair_tables(models)
+    for couple, (n, m) in enumerate(product(numbers, numbers)):
+        for _, c12, c6 in tables.numbers[tables.starts[couple] : tables.starts[couple + 1]]:
+            energy_integral, pressure_integral = _beyond(c12, c6, cutoff_angstrom, width_angstrom)
+            energy += 2 * math.pi * n * m * energy_integral
+            pressure += 2 * math.pi * n * m * pressure_integral
     return energy, pressure

@@ -6,7 +6,7 @@ Molecules broken by the edge of the cell are made whole first.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -59,16 +59,6 @@ class Bodies:
         """1/I_i, (n, 3); 0 for axes without rotation."""
         return np.divide(1.0, self.moments, out=np.zeros_like(self.moments), where=self.moments > 0.0)
 
-    @property
-    def acting_inverse(self) -> Floats:
-        """1/I_i for the integrator: a linear rotor moves like a sphere of its moment (`rotor.classical.system`); 0 for an atom."""
-        from rotor.classical.system import acting_inverse
-
-        out = np.zeros_like(self.moments)
-        turning = self.moments.any(axis=-1)
-        out[turning] = acting_inverse(self.moments[turning])
-        return out
-
     def degrees(self, removed: int = 0) -> Degrees:
         """The degrees of freedom, minus `removed` (3 if the total momentum is held at 0)."""
         return replace(count_degrees(self.moments, removed=removed), notes=self.notes)
@@ -86,16 +76,35 @@ class Bodies:
         place(pose.centres, pose.attitude, self.sites, self.order, self.starts, out)
         return out
 
-    def pose(self, atoms: Atoms, tolerance_angstrom: float = SHAPE_TOLERANCE_ANGSTROM) -> Pose:
-        """The pose of the bodies in a box of the same atoms."""
+    def pose(
+        self, atoms: Atoms, tolerance_angstrom: float = SHAPE_TOLERANCE_ANGSTROM, of_models: Container[str] = ()
+    ) -> Pose:
+        """The pose of the bodies in a box of the same atoms; of_models: names of the species that have the shape of a model."""
         centres, attitude = np.zeros((len(self), 3)), np.zeros((len(self), 4))
         for number, name in enumerate(self.names):
             members = np.flatnonzero(self.species == number)
             rows = np.stack([self.order[self.starts[b] : self.starts[b + 1]] for b in members])
-            shape = _Shape(self.sites[rows[0]], self.moments[members[0]], self.masses[rows[0]])
-            places = whole(atoms.positions[rows], atoms)
-            centres[members], attitude[members] = _fitted(shape, places, members, rows, name, tolerance_angstrom)
+            places, masses = whole(atoms.positions[rows], atoms), self.masses[rows[0]]
+            centres[members] = np.einsum("m,kmi->ki", masses / masses.sum(), places)
+            if not self.moments[members[0]].any():
+                attitude[members, 0] = 1.0
+                continue
+            shape = np.broadcast_to(self.sites[rows[0]], places.shape)
+            fit = superpose(shape, places, masses)
+            attitude[members] = fit.quaternion
+            off = np.linalg.norm(fit.apply(shape) - places, axis=-1).max(axis=-1)
+            self._refuse_other_shapes(members, off, tolerance_angstrom, name in of_models)
         return Pose(centres, attitude)
+
+    def _refuse_other_shapes(self, members: Ints, off: Floats, tolerance_angstrom: float, is_model: bool) -> None:
+        """Refuse bodies of a species whose atoms are too far off their places in its shape."""
+        worst = int(np.argmax(off))
+        if off[worst] > tolerance_angstrom:
+            raise ValueError(
+                f"{self.name_of(members[worst])}: an atom is {off[worst]:.3g} Å off its place "
+                f"in the shape of its {'model' if is_model else 'species'}, more than {tolerance_angstrom:g} Å; rigid molecules of "
+                f"one species have one shape{', and another model another one' if is_model else ''}"
+            )
 
     def wrench(self, vectors: Floats, attitude: Floats) -> tuple[Floats, Floats]:
         """Sum (n, 3) in space, and sum of s x v (n, 3) in body axes, of vectors (atoms, 3) on the atoms.
@@ -171,22 +180,19 @@ def rigid_bodies(
     n = len(starts) - 1
     groups = _species(atoms, masses, order, starts)
     sites, moments, notes = np.zeros((len(atoms), 3)), np.zeros((n, 3)), list[str]()
-    centres, attitude, species = np.zeros((n, 3)), np.zeros((n, 4)), np.zeros(n, dtype=np.int64)
+    species = np.zeros(n, dtype=np.int64)
     for number, (elements, members) in enumerate(groups):
         rows = np.stack([order[starts[b] : starts[b + 1]] for b in members])
-        places = whole(atoms.positions[rows], atoms)
-        model_shape = (shapes or {}).get(elements)
-        shape = _principal(
-            masses[rows[0]], places[0] if model_shape is None else np.asarray(model_shape, dtype=np.float64)
-        )
-        sites[rows], moments[members], species[members] = shape.sites, shape.moments, number
-        notes += [f"{_formula(elements)}: {note}" for note in shape.notes]
-        centres[members], attitude[members] = _fitted(
-            shape, places, members, rows, _formula(elements), tolerance_angstrom, model_shape is not None
-        )
+        places = (shapes or {}).get(elements)
+        if places is None:
+            places = whole(atoms.positions[rows[:1]], atoms)[0]
+        sites[rows], moments[members], remarks = _principal(masses[rows[0]], np.asarray(places, dtype=np.float64))
+        species[members] = number
+        notes += [f"{_formula(elements)}: {note}" for note in remarks]
     mass = np.add.reduceat(masses[order], starts[:-1])
     names = tuple(_formula(elements) for elements, _ in groups)
-    return Bodies(order, starts, sites, masses, mass, moments, species, names, tuple(notes)), Pose(centres, attitude)
+    bodies = Bodies(order, starts, sites, masses, mass, moments, species, names, tuple(notes))
+    return bodies, bodies.pose(atoms, tolerance_angstrom, {_formula(elements) for elements in shapes or {}})
 
 
 def atom_masses(atoms: Atoms) -> Floats:
@@ -296,18 +302,11 @@ def _species(atoms: Atoms, masses: Floats, order: Ints, starts: Ints) -> list[tu
     return [(elements, np.array(members)) for (elements, _), members in groups.items()]
 
 
-@dataclass(frozen=True)
-class _Shape:
-    """Sites (m, 3) in principal axes, moments (3,), masses (m,), and notes on the moments."""
+def _principal(masses: Floats, places: Floats) -> tuple[Floats, Floats, tuple[str, ...]]:
+    """Sites (m, 3) of a molecule in principal axes, moments (3,) and notes on these.
 
-    sites: Floats
-    moments: Floats
-    masses: Floats
-    notes: tuple[str, ...] = ()
-
-
-def _principal(masses: Floats, places: Floats) -> _Shape:
-    """The shape of a molecule; for a linear one the sites are on the axis and the moments are (0, I, I)."""
+    The sites of a linear molecule are on the axis, and its moments are (0, I, I).
+    """
     if places.shape != (len(masses), 3):
         raise ValueError(f"a shape of {places.shape} for a molecule of {len(masses)} atoms")
     heavy = masses > 0.0
@@ -320,39 +319,14 @@ def _principal(masses: Floats, places: Floats) -> _Shape:
             raise ValueError(
                 "a molecule with a single massive site and massless sites elsewhere has no moments of inertia: give these sites a mass"
             )
-        return _Shape(centred, np.zeros(3), masses)
+        return centred, np.zeros(3), ()
     frame = inertia.principal_frame(body)
     sites, moments = centred @ frame.axes.T, frame.moments
     notes = count_degrees(moments[None]).notes
     if rotating_axes(moments).sum() == 2:
         sites[:, 1:] = 0.0
         moments = np.array([0.0, 1.0, 1.0]) * float(masses @ sites[:, 0] ** 2)
-    return _Shape(sites, moments, masses, notes)
-
-
-def _fitted(
-    shape: _Shape,
-    places: Floats,
-    members: Ints,
-    rows: Ints,
-    formula: str,
-    tolerance_angstrom: float,
-    is_model_shape: bool = False,
-) -> tuple[Floats, Floats]:
-    """Centres (k, 3) and attitudes (k, 4) that superpose the shape on molecules (k, m, 3); ValueError if it does not fit."""
-    centres = np.einsum("m,kmi->ki", shape.masses / shape.masses.sum(), places)
-    if not shape.moments.any():
-        return centres, np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))
-    fit = superpose(np.broadcast_to(shape.sites, places.shape), places, shape.masses)
-    off = np.linalg.norm(fit.apply(np.broadcast_to(shape.sites, places.shape)) - places, axis=-1).max(axis=-1)
-    worst = int(np.argmax(off))
-    if off[worst] > tolerance_angstrom:
-        raise ValueError(
-            f"molecule {members[worst]} ({formula}, atoms {_listed(rows[worst])}): an atom is {off[worst]:.3g} Å off its place "
-            f"in the shape of its {'model' if is_model_shape else 'species'}, more than {tolerance_angstrom:g} Å; rigid molecules of "
-            f"one species have one shape{', and another model another one' if is_model_shape else ''}"
-        )
-    return centres, fit.quaternion
+    return sites, moments, notes
 
 
 def _formula(elements: Sequence[str]) -> str:

@@ -65,7 +65,9 @@ class Flows:
 
     @cached_property
     def _inverse(self) -> Floats:
-        return self.bodies.acting_inverse
+        from rotor.classical.system import acting_inverse
+
+        return acting_inverse(self.bodies.moments)
 
     @cached_property
     def _axes(self) -> NDArray[np.int64]:
