@@ -226,11 +226,6 @@ def test_what_must_be_given_has_no_default_in_the_signature():
     assert "MISSING" not in str(signature)
 
 
-def test_a_pulse_as_a_line_says_how_it_is_written():
-    with pytest.raises(ValueError, match=r"no shape is named .*; there are gaussian, .* \(a name, then key=value\)"):
-        rotor.align("OCS", pulses=["1e13 W/cm2, 1 ps"])
-
-
 def test_further_building_blocks_are_in_one_place():
     assert sorted(api.modules()) == dir(api)
     for name in set(api.modules()) - api.MOVED:
