@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from rotor.quantum.basis.state_elements import linear_blocks_of
+from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants.constants import Constants
 from rotor.tops.states.state_constants import StateConstants

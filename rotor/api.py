@@ -170,7 +170,7 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.plots.structure import structure_figure as structure_figure
     from rotor.quantum.basis.labelled import Basis as Basis
     from rotor.quantum.basis.labelled import rotation_labels as rotation_labels
-    from rotor.quantum.blocks import linear_blocks as linear_blocks
+    from rotor.quantum.blocks.connected import linear_blocks as linear_blocks
     from rotor.quantum.effects.of_top import effects_of as effects_of
     from rotor.quantum.effects.spin_effect import quadrupole_of_tensor as quadrupole_of_tensor
     from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2 as MHZ_ANGSTROM3_W_PER_CM2

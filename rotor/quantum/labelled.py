@@ -17,8 +17,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints, Workspace, distinct, numbers_in_runs
 from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateTerms, wang_stacks
+from rotor.quantum.blocks.linear_stacks import LinearStack, numbered
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.linear_stacks import LinearStack, numbered
 from rotor.quantum.wang.basis import SPECIES, WangBlock, names_of_blocks, wang_blocks
 from rotor.quantum.wang.wang_matrix import diagonal_elements
 from rotor.table import with_article

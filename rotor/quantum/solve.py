@@ -4,7 +4,7 @@
 |---|---|
 | J^2p alone, any top; J^2p Jz^2q of a symmetric top; the cubic tensor of a spherical top | closed form |
 | orthorhombic ones, of an asymmetric or any other nonlinear top | Wang blocks: tridiagonal, else dense |
-| any other operator of J, several states | connected Wang blocks (`coupled`) |
+| any other operator of J, several states | connected Wang blocks (`wang.coupled_levels`) |
 | internal rotation | torsion for each K, then blocks of torsion and rotation (`internal_rotation`) |
 | tensors coupled to spins | any of these for the rotation, then F blocks (`spins`) |
 

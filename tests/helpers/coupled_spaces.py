@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from rotor.quantum.blocks import connected_parts, elements_by_blocks
+from rotor.quantum.blocks.connected import connected_parts, elements_by_blocks
 from rotor.quantum.spins.coupling import reduced_spin
 from rotor.quantum.wigner import nine_j
 

@@ -6,7 +6,7 @@ import numpy as np
 from coupled_spaces import Space, contracted_elements
 
 from rotor.quantum.basis.labelled import Elements, merged
-from rotor.quantum.blocks import connected_blocks, part_numbers
+from rotor.quantum.blocks.connected import connected_blocks, part_numbers
 from rotor.quantum.operators.algebra import shift
 
 NEGLIGIBLE = 1e-12  # of the largest element of an operator between two sectors: round-off of zero

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from rotor.quantum import dominated
-from rotor.quantum.dominated import dominated_states
+from rotor.quantum.blocks import dominated
+from rotor.quantum.blocks.dominated import dominated_states
 
 
 def matrix_of(coupling, *, resonance=False, size=300, count=12):

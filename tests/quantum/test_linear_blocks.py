@@ -27,9 +27,9 @@ from plain_tensors import symmetric_top_elements
 import rotor
 from rotor import units
 from rotor.quantum.basis.labelled import Basis, rotation_labels
-from rotor.quantum.blocks import connected_blocks, linear_blocks
+from rotor.quantum.blocks.connected import connected_blocks, linear_blocks
+from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import UNIT, Operator, diagonal, half_anticommutator, shift
 from rotor.quantum.operators.rotation import body_tensor, j_squared, j_x, j_y, j_z, ladder, sum_of_powers
 from rotor.quantum.symmetric_top_elements import space_factor

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.quantum.coupled_levels import match_names
+from rotor.quantum.wang.coupled_levels import match_names
 
 
 @pytest.mark.parametrize("kind", ["vectors", "numbers", "ties"])

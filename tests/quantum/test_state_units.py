@@ -12,11 +12,11 @@ from rotor.formats.spcat.fits import fit_states
 from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.basis.state_elements import linear_blocks_of
+from rotor.quantum.blocks.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.label_tracking import TrackedLevels
-from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.solve import solve_levels
 from rotor.tops.top import Top
 
@@ -90,7 +90,7 @@ def test_levels_that_a_state_does_not_have_are_named():
 
 def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
     """Side by side and padded, or one at a time."""
-    from rotor.quantum import linear_stacks
+    from rotor.quantum.blocks import linear_stacks
 
     labels = np.array([[n, ka, n - ka, v] for n in range(3, 9) for ka in range(3) for v in range(3)])
     text = THREE.format(options=OPTIONS["prolate"])  # less what connects all blocks of one J

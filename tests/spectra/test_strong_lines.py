@@ -7,8 +7,8 @@ import pytest
 
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.stacked_blocks import Vector, are_whole, stacked
 from rotor.quantum.tensors import body_tensor
+from rotor.quantum.wang.stacked_blocks import Vector, are_whole, stacked
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import Lines, line_list
 from rotor.spectra.transitions import pairs as transitions

@@ -27,7 +27,7 @@ from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, file
 from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions, species_numbers
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.frozen import dataclass
-from rotor.quantum.blocks import part_numbers
+from rotor.quantum.blocks.connected import part_numbers
 from rotor.quantum.levels import Levels
 
 

@@ -46,7 +46,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import weights_agree
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass
-from rotor.quantum.blocks import connected_parts
+from rotor.quantum.blocks.connected import connected_parts
 from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels

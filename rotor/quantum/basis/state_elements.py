@@ -14,10 +14,10 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct, numbers_in_runs
 from rotor.quantum.basis.wang_functions import BetweenStates, WangElements, WangFunctions
-from rotor.quantum.blocks import connected_parts
+from rotor.quantum.blocks.connected import connected_parts
+from rotor.quantum.blocks.linear_stacks import LinearBlock, LinearStack, numbered, stack_numbers
 from rotor.quantum.effect import Coupling, QuantumEffect, State, couplings_of
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.linear_stacks import LinearBlock, LinearStack, numbered, stack_numbers
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.wang.basis import SpeciesFactors, WangBlock, parts_of
 from rotor.quantum.wang.wang_matrix import unit_diagonals

@@ -23,9 +23,9 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateTerms
+from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins, rotation_blocks
 from rotor.quantum.spins.parts import SpinPart, assigned, named_states, turned
 

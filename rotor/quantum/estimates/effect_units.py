@@ -13,6 +13,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import linear_blocks_of, vertices_of
+from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.label_tracking import (
     AssignedLevels,
@@ -25,7 +26,6 @@ from rotor.quantum.label_tracking import (
     tracked_blocks,
 )
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.spins.blocks import SpinFunctions
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.quantum.blocks import coloured_components, connected_parts
+from rotor.quantum.blocks.connected import coloured_components, connected_parts
 from rotor.quantum.fields.axial import AxialSpace, axial_levels
 from rotor.quantum.fields.blocks import (
     BEFORE_J,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.coupled_levels import match_names
+from rotor.quantum.wang.coupled_levels import match_names
 
 
 def torsional_numbers(vectors: NDArray[np.generic], t: Ints, vt_max: int) -> Ints:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.blocks import ByBlocks, Entries, elements_by_blocks
+from rotor.quantum.blocks.connected import ByBlocks, Entries, elements_by_blocks
 from rotor.quantum.internal_rotation.chain_rule import NO_CHAIN, ChainRule, chain_rule, further_operators
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import exchanged_functions

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.labelled import Elements
-from rotor.quantum.blocks import FunctionBlocks, connected_blocks
-from rotor.quantum.dominated import dominated_states, is_dominated
+from rotor.quantum.blocks.connected import FunctionBlocks, connected_blocks
+from rotor.quantum.blocks.dominated import dominated_states, is_dominated
+from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.internal_rotation.contracted import Product, Terms
 from rotor.quantum.internal_rotation.expectations import Expectations
 from rotor.quantum.internal_rotation.functions import TorsionRotation
@@ -25,7 +26,6 @@ from rotor.quantum.internal_rotation.labels import (
     kc_of_parity,
     torsional_numbers,
 )
-from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import Operator
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.frozen import dataclass
-from rotor.quantum.blocks import part_numbers
+from rotor.quantum.blocks.connected import part_numbers
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import SolvedBlock, Used

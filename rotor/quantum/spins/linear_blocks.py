@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
+from rotor.quantum.blocks.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock
-from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.blocks import Shared, SpinFunctions
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, padded_vectors, stacks_of
 from rotor.quantum.spins.many_f import Coefficients, Frame, Group, Tables, between, coefficients_by_f, tables_of

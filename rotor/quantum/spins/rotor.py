@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
-from rotor.quantum.coupled_levels import names_of_functions
 from rotor.quantum.effect import couplings_of, k_limits_of
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.scheme import EVERY_STATE, AxialState, Rotor, Scheme, SpinTerm, is_axial, scheme_of, summed
 from rotor.quantum.tabulated import as_tabulated
 from rotor.quantum.wang.basis import Part, WangBlock
+from rotor.quantum.wang.coupled_levels import names_of_functions
 from rotor.quantum.wang.rotation import hamiltonian, solve_rotation
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from math import sqrt
 import numpy as np
 
 from rotor.arrays import Floats, Ints, symmetric_from_lower
-from rotor.quantum.blocks import part_numbers
+from rotor.quantum.blocks.connected import part_numbers
 from rotor.quantum.spins.blocks import Members, Plan, States, blocks_of_f, diagonalised
 from rotor.quantum.spins.coupling import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.spins.many_f import Frame, groups_of, hamiltonians

@@ -1,1 +1,1 @@
-"""Rotation without spins: Wang functions, matrices of angular momentum, and their solution."""
+"""Rotation without spins: Wang functions, matrices of angular momentum, their solution, and states that couplings connect."""

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.coupled_levels import Model, coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, levels_table, single_block
 from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of_blocks
+from rotor.quantum.wang.coupled_levels import Model, coupled_levels, model_of
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import (
     block_bands,

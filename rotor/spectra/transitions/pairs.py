@@ -18,8 +18,8 @@ from rotor.frozen import dataclass
 from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.reduced import connections, wang_columns
-from rotor.quantum.stacked_blocks import are_whole
 from rotor.quantum.tensors import body_tensor
+from rotor.quantum.wang.stacked_blocks import are_whole
 from rotor.spectra.intensity import IntensityCut
 from rotor.spectra.transitions.strong_lines import strong_lines
 from rotor.tops.constants.operators import FIGURE_AXIS

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.stacked_blocks import ParityStates, Product, Vector, stacked
 from rotor.quantum.tensors import BodyTensor
+from rotor.quantum.wang.stacked_blocks import ParityStates, Product, Vector, stacked
 
 SMALLEST_MHZ = 1e-30  # replaces 0 between states of equal energy
 ALIKE, SMALL = 1.3, 16  # ratio of the sizes of blocks of several J in one array; smaller ones are alike

@@ -110,7 +110,7 @@ def test_what_cannot_be_derived_is_said():
 
 
 def test_pieces_give_the_same(monkeypatch):
-    from rotor.quantum import linear_stacks
+    from rotor.quantum.blocks import linear_stacks
 
     top = Top(S_SET)
     levels = solve_levels(top, 15)

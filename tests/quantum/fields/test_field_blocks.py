@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rotor.alignment.axis_functions import absolute_cosine, asymmetric_elements
-from rotor.quantum.blocks import coloured_components
+from rotor.quantum.blocks.connected import coloured_components
 from rotor.quantum.fields.axial import cosine_bands
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import field_space, tilted_space

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import rotor
-from rotor.quantum.dominated import dominated_states
+from rotor.quantum.blocks.dominated import dominated_states
 from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
 from rotor.quantum.internal_rotation.levels import turning_tops

@@ -42,7 +42,7 @@ from rotor.formats.spcat.hamiltonian.labels import (
 )
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.quantum.blocks import connected_parts
+from rotor.quantum.blocks.connected import connected_parts
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.estimates.effect_units import Functions, assigned_with_spins, unit_levels
 from rotor.quantum.label_tracking import AssignedLevels, TrackedLevels, labelled_states, without_level

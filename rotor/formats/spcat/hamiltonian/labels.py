@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.blocks import part_numbers
+from rotor.quantum.blocks.connected import part_numbers
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinFunctions
 from rotor.quantum.spins.parts import assigned, names_of_parts

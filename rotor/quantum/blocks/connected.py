@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Ints
 from rotor.quantum.basis.labelled import ROUND_OFF, Basis, Elements
-from rotor.quantum.linear_stacks import LinearBlock
+from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import Operator
 
 

@@ -6,7 +6,7 @@ one array, padded, so that new constants cost some products of arrays, one diago
 
     ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_u M_ui Σ_(r,c) U_u(r, c) v_r* v_c
 
-more products for the states that are asked for. `blocks` finds the blocks of an operator algebra, `basis.state_elements` and
+more products for the states that are asked for. `connected` finds the blocks of an operator algebra, `basis.state_elements` and
 `spins.linear_blocks` write those of states and spins, `label_tracking` follows named states while constants change.
 """
 
