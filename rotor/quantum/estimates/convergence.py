@@ -156,13 +156,10 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     blocks = [block for block in levels.blocks if block.alone and len(block.energies_mhz) > 1]
     if not blocks or hamiltonian(top, levels.effects) == hamiltonian(top, (Rigid(),)):  # a rigid top is in order
         return []
-    along_and_across = {
-        powers: value for powers, value in rigid_operators(top.constants).items() if powers[1:] != (0, 0)
-    }
-    number, rows = numbers_in_runs(
-        np.array([len(block.energies_mhz) for block in blocks]), np.array([block.start for block in blocks])
-    )
-    (rigid,) = expectations(levels, [along_and_across], rows).T
+    with_k = {powers: value for powers, value in rigid_operators(top.constants).items() if powers[1:] != (0, 0)}
+    sizes, starts = np.array([(len(block.energies_mhz), block.start) for block in blocks]).T
+    number, rows = numbers_in_runs(sizes, starts)
+    (rigid,) = expectations(levels, [with_k], rows).T
     largest = np.maximum.reduceat(np.abs(rigid), np.searchsorted(number, np.arange(len(blocks))))
     falls = (np.diff(rigid) < -1e-9 * largest[number[1:]]) & (np.diff(number) == 0)
     return [(blocks[i].j, blocks[i].basis.species) for i in distinct(number[1:][falls]).tolist()]

@@ -220,12 +220,10 @@ def pairs_of_blocks(blocks: Sequence[FieldBlock]) -> Iterator[tuple[int, int, in
             yield low, low, 0, blocks[low].copies
             if m > -1 or paired:
                 copies = 2 if paired or m >= 0 else 1
-                yield from ((up, low, 1, copies) for up in by_m.get(m + 1, []) if _same_k(blocks[up], blocks[low]))
-
-
-def _same_k(up: FieldBlock, low: FieldBlock) -> bool:
-    """Whether K is the same; at M = 0 the block of K represents that of -K too."""
-    if isinstance(low.space, AxialSpace):
-        (k_up,), (k_low,) = up.members, low.members
-        return abs(k_up) == abs(k_low) if low.m == 0 else k_up == k_low
-    return up.paired == low.paired
+                for up in by_m.get(m + 1, []):
+                    same = blocks[up].paired == paired
+                    if isinstance(blocks[low].space, AxialSpace):  # at M = 0 the block of K represents that of -K too
+                        (k,), (other,) = blocks[up].members, blocks[low].members
+                        same = k == other or (m == 0 and k == -other)
+                    if same:
+                        yield up, low, 1, copies
