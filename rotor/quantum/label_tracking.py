@@ -344,29 +344,20 @@ class TrackedLevels(LevelModel):
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`; nan for labels that are not in these blocks."""
-        energies, slopes = self._tracked_levels(values_mhz)
+        energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place
+        slopes = np.zeros((self.count + 1, len(values_mhz) + 1))
+        if all(np.array_equal(block.values_mhz, values_mhz[block.block.parameters]) for block in self.tracked):
+            for block in self.tracked:
+                energies[block.rows] = block.energies
+                slopes[block.rows[:, None], block.block.parameters] = block.slopes
+        else:
+            for labelled in self._labelled:
+                energies[labelled.rows], derived = labelled.levels(values_mhz, self._space)
+                slopes[labelled.rows[:, :, None], labelled.stack.parameters[:, None, :]] = derived
         for part in self.others:
             energies[part.rows], derived = part.blocks.levels(values_mhz[part.columns])
             slopes[part.rows[:, None], part.columns] = derived
-        return energies, slopes
-
-    def _tracked_levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        if all(np.array_equal(block.values_mhz, values_mhz[block.block.parameters]) for block in self.tracked):
-            return self._levels_at_start(len(values_mhz))
-        energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place
-        slopes = np.zeros((self.count + 1, len(values_mhz) + 1))
-        for labelled in self._labelled:
-            solved, derived = labelled.levels(values_mhz, self._space)
-            energies[labelled.rows] = solved
-            slopes[labelled.rows[:, :, None], labelled.stack.parameters[:, None, :]] = derived
         return energies[:-1], slopes[:-1, :-1]
-
-    def _levels_at_start(self, parameters: int) -> tuple[Floats, Floats]:
-        energies, slopes = np.full(self.count, np.nan), np.zeros((self.count, parameters))
-        for block in self.tracked:
-            energies[block.rows] = block.energies
-            slopes[block.rows[:, None], block.block.parameters] = block.slopes
-        return energies, slopes
 
 
 def labelled_states(

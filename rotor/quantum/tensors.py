@@ -225,10 +225,10 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
         table = _coupling_table(low.j // _J_AT_ONCE, up.j - low.j, rank, step)
         k = slice(low.first_k + 2 * source.start, low.first_k + 2 * source.stop, 2)
         elements = table[low.j % _J_AT_ONCE, k] * parts[rank + step]
-        for row, column, k_up, k in folded:
-            if k_up - k == step and row < up.size and column < low.size:
-                turned = float(coupling(low.j, up.j, rank, k_up + k, -k))
-                elements[column - source.start] += low.sign * turned * parts[rank + k_up + k]
+        for row, column, k_up, k_low in folded:
+            if k_up - k_low == step and row < up.size and column < low.size:
+                turned = float(coupling(low.j, up.j, rank, k_up + k_low, -k_low))
+                elements[column - source.start] += low.sign * turned * parts[rank + k_up + k_low]
         out.append(Band(source, target, elements))
     return out
 

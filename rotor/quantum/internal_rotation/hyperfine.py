@@ -58,8 +58,7 @@ def hyperfine_levels(
             "spins of several nuclei beside equivalent tops: their exchange is not computed; leave one of them out"
         )
     terms = valued_terms(top, effects)
-    first = max(2 * nmin - scheme.total, scheme.total % 2)
-    all_f = range(first, 2 * nmax + scheme.total + 1, 2)  # neighbouring N are solved too, since spins mix them in
+    all_f = scheme.reached_f(nmin, nmax)  # neighbouring N are solved too, since spins mix them in
     free = torsion_rotation_levels(top, constants, effects, max(0, nmin - scheme.total), nmax + scheme.total)
     names = np.column_stack([np.arange(len(free)), free.quanta["ka"], free.quanta["kc"]])
     coupled = coupled_blocks(free.blocks, names, scheme, terms, all_f)

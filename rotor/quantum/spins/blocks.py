@@ -11,7 +11,7 @@ a Kronecker product for each pair of solved blocks. Blocks that no channel conne
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,7 +21,6 @@ from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.frozen import dataclass
 from rotor.quantum.blocks.connected import part_numbers
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import SolvedBlock, Used
 from rotor.quantum.spins.contraction import (
     Contracted,
@@ -165,16 +164,12 @@ def diagonalised(numbers: Sequence[int], matrices: Floats, zeros_mhz: Floats) ->
 
 @dataclass(frozen=True)
 class Plan:
-    """Solved rotation, operators of each channel, and the blocks that they connect.
-
-    families: members (block, class), see `_families`. contracted: operators in stacks, each with the channels that share it.
-    """
+    """Solved rotation and operators in stacks, each with the channels that share it."""
 
     scheme: Scheme
     representation: str
     stacks: list[Stack] = field(repr=False)
     blocks: list[SolvedBlock]
-    families: list[list[tuple[int, int]]]
     contracted: InStacks = field(repr=False)
     used: Used | None = None
 
@@ -182,22 +177,17 @@ class Plan:
         """The data of all blocks, with the frame of their F."""
         return Shared(self.scheme, self.representation, self.stacks, frame, self.used)
 
-    @property
-    def state_by_state(self) -> bool:
-        """Whether spins mix no rotational states (first order)."""
-        return self.used is not None and self.used.method == FIRST_ORDER
-
     @cached_property
     def sizes(self) -> list[int]:
         """The number of states of each rotational block."""
         return [len(block.energies_mhz) for block in self.blocks]
 
-    def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:
-        """This rotation with the operators of a treatment of the spins (all by default), which `used` describes."""
-        if operators is None:
-            return replace(self, used=used)
-        families = _families(len(self.blocks), _links(operators), max(self.scheme.equivalent, 1))
-        return replace(self, families=families, contracted=operators, used=used)
+    @cached_property
+    def families(self) -> list[list[tuple[int, int]]]:
+        """Members (block, class) that operators connect; all blocks with three equivalent nuclei, whose exchange divides them later."""
+        if self.scheme.equivalent == 3:
+            return [[(number, 0) for number in range(len(self.blocks))]]
+        return _families(len(self.blocks), _links(self.contracted), max(self.scheme.equivalent, 1))
 
 
 def contracted_plan(
@@ -236,11 +226,7 @@ def rotor_plan(blocks: list[SolvedBlock], representation: str, scheme: Scheme, t
     contracted = [(by_channel[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
     if hamiltonians:
         contracted.append(([within_blocks(stack, hamiltonians) for stack in stacks], [ALONE]))
-    if hamiltonians:  # divided by the exchange later, see `three_equivalent`
-        families = [[(number, 0) for number in range(len(blocks))]]
-    else:
-        families = _families(len(blocks), _links(contracted), max(scheme.equivalent, 1))
-    return Plan(scheme, representation, stacks, blocks, families, contracted)
+    return Plan(scheme, representation, stacks, blocks, contracted)
 
 
 def _links(contracted: InStacks) -> Ints:

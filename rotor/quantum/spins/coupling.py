@@ -57,10 +57,11 @@ def patterns_of_total(spins: tuple[int, ...], f: int) -> Ints:
     [[0, 2, 2], [2, 2, 2], [2, 0, 2], [4, 2, 2]]
     """
     *others, a, b = spins
-    rows = []
-    for total in range(abs(a - b), a + b + 1, 2):
-        for pattern in patterns((*others, total), f).tolist():
-            rows.append((pattern[0], (a + b - total) // 2 % 2, *pattern[1:-1], total, pattern[-1]))
+    rows = [
+        (pattern[0], (a + b - total) // 2 % 2, *pattern[1:-1], total, f)
+        for total in range(abs(a - b), a + b + 1, 2)
+        for pattern in patterns((*others, total), f).tolist()
+    ]
     table = np.array(sorted(rows), dtype=np.int64).reshape(-1, 2 + len(spins))
     return np.delete(table, 1, axis=1)
 
@@ -286,8 +287,8 @@ def recoupling_of_three(spins: tuple[int, ...], one_by_one: Ints, total: Ints) -
         right = total[columns][None, :, :]
         alike = (left[..., :-3] == right[..., :-3]).all(axis=-1)
         start, g, g2, f = (left[..., k] for k in (-4, -3, -2, -1))
-        place = np.searchsorted(functions.symmetry, right[0, :, -3], sorter=np.argsort(functions.symmetry))
-        amplitudes = functions.amplitudes[:, np.argsort(functions.symmetry)[place]]
+        place = {name: column for column, name in enumerate(functions.symmetry.tolist())}
+        amplitudes = functions.amplitudes[:, [place[name] for name in right[0, :, -3].tolist()]]
         for pair, amplitude in zip(functions.pair_spins.tolist(), amplitudes, strict=True):
             first = recoupled(g, i, g2, i, f, pair)
             second = recoupled(start, i, g, pair, f, twice_total)

@@ -54,9 +54,7 @@ def spin_levels(
 
     Each F that such an N reaches is solved with all its N, so that no block is truncated. Half-integer quantum numbers are doubled.
     """
-    total = scheme_of(top, effects).total
-    first = max(2 * jmin - total, total % 2)
-    return levels_of_f(top, effects, range(first, 2 * jmax + total + 1, 2), (jmin, jmax), executor)
+    return levels_of_f(top, effects, scheme_of(top, effects).reached_f(jmin, jmax), (jmin, jmax), executor)
 
 
 def levels_of_f(
@@ -74,7 +72,7 @@ def levels_of_f(
     """
     hold_freed_memory()
     lowest, highest = _range_of_n(top, effects, all_f)
-    plan = simplified(contracted_plan(top, effects, lowest, highest, executor, exist), effects, all_f)
+    plan = simplified(contracted_plan(top, effects, lowest, highest, executor, exist), effects)
     solved = solved_blocks(plan, all_f, exist)
     if n_range:
         solved = [within_n(block, n_range) for block in solved]
@@ -139,7 +137,7 @@ def _table(top: Top, effects: tuple[QuantumEffect, ...], blocks: tuple[SolvedBlo
     )
 
 
-def simplified(plan: Plan, effects: Sequence[QuantumEffect], all_f: Sequence[int]) -> Plan:
+def simplified(plan: Plan, effects: Sequence[QuantumEffect]) -> Plan:
     """The plan with the elements of the requested treatment; unchanged if none is requested."""
     requested = next((effect for effect in effects if isinstance(effect, HyperfineMethod)), None)
     if requested is None:
@@ -148,25 +146,23 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], all_f: Sequence[int
         raise ValueError(
             f"method {requested.method} with a total spin of three nuclei: only the exact method computes them"
         )
-    if requested.method == EXACT or plan.scheme.equivalent == 3:
-        return plan.with_method(Used(EXACT, 0.0, requested.tolerance_mhz))
-    from rotor.quantum.spins.neglected import largest_shifts
+    chosen, estimates = requested.method, {EXACT: 0.0}
+    if chosen != EXACT and plan.scheme.equivalent < 3:
+        from rotor.quantum.spins.neglected import largest_shifts
 
-    other_n, same_n = largest_shifts(plan)
-    estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
-    chosen = requested.method
+        other_n, same_n = largest_shifts(plan)
+        estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
     if chosen == "auto":
         chosen = next(name for name, size in estimates.items() if size <= requested.tolerance_mhz)
     used = Used(chosen, estimates[chosen], requested.tolerance_mhz)
-    if chosen == EXACT:
-        return plan.with_method(used)
-    return plan.with_method(
-        used, [(_without_neglected(contracted, chosen), channels) for contracted, channels in plan.contracted]
-    )
+    operators = [(_without_neglected(contracted, chosen), channels) for contracted, channels in plan.contracted]
+    return replace(plan, used=used, contracted=operators)
 
 
 def _without_neglected(contracted: Sequence[Contracted], method: str) -> list[Contracted]:
     """Operators without elements that a treatment neglects."""
+    if method == EXACT:
+        return list(contracted)
     same_n = [entry for entry in contracted if not entry.pairs.rise]
     if method == N_DIAGONAL:
         return same_n
@@ -260,7 +256,7 @@ def _solved(numbers: list[int], matrices: Floats, repeats: int, zeros: Floats) -
 def _kinds(plan: Plan, members: Members) -> list[tuple[int, int, int]]:
     """Functions and sub-blocks of each block, and the number of patterns where each rotational state is solved by itself, else 1."""
     parts, repeats = members.parts, np.ones(len(members.levels), dtype=np.int64)
-    if plan.state_by_state:
+    if plan.used is not None and plan.used.method == FIRST_ORDER:
         repeats = np.where(parts.counts == 1, (parts.last - parts.first)[parts.begins], 1)
     return list(zip(members.levels.tolist(), members.sub_blocks.tolist(), repeats.tolist(), strict=True))
 

@@ -90,10 +90,6 @@ class Group:
             out.append((np.array(indices), columns, states))
         return out
 
-    def runs(self) -> Iterator[slice]:
-        """Runs of blocks of similar size, whose matrices share an array."""
-        return runs_of_similar_size((self.columns * self.heights).tolist(), _LIKE, _SMALL, _MOST)
-
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -366,7 +362,7 @@ def _matrices_of_group(
     space: Workspace,
 ) -> Iterator[tuple[list[int], NDArray[Any]]]:  # fmt: skip
     """Places of blocks of one kind in a group, and their matrices."""
-    for run in group.runs():
+    for run in runs_of_similar_size((group.columns * group.heights).tolist(), _LIKE, _SMALL, _MOST):
         places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
         shape = len(places), group.columns, height, group.columns, height
         whole = space.array("whole", *shape, dtype=element_type(tables for tables, _ in acting))

@@ -171,15 +171,9 @@ def moments_of(
     """Dipoles by pairs of states and other moments, for levels with spins; ValueError for levels without."""
     if not levels.blocks or levels.blocks[0].spins is None:
         raise ValueError("moments besides plain dipoles need levels that were solved with spins")
-    return spin_moments(levels.blocks[0].spins.shared, with_dipoles(dipoles, moments))
-
-
-def with_dipoles(
-    dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
-) -> tuple[Moment, ...]:
-    """All moments: plain dipoles by pairs of states, then the others."""
     plain = [Moment(1.0, states, Cosines(along)) for states, along in dipoles.items() if any(along)]
-    return (*plain, *(moment for moment in moments if moment.value_debye))
+    others = [moment for moment in moments if moment.value_debye]
+    return spin_moments(levels.blocks[0].spins.shared, plain + others)
 
 
 def amplitudes_of_groups(

@@ -197,9 +197,6 @@ def assigned(shares: Floats, capacity: Ints) -> Ints:
     >>> assigned(np.array([[0.9, 0.6, 0.0], [0.1, 0.4, 1.0]]), np.array([1, 2])).tolist()
     [0, 1, 1]
     """
-    dominant = shares.argmax(axis=0)
-    if (np.bincount(dominant, minlength=len(capacity)) == capacity).all():
-        return np.asarray(dominant)
     return np.asarray(assigned_alike(shares[None], capacity[None])[0])
 
 

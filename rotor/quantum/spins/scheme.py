@@ -312,6 +312,10 @@ class Scheme:
         """Twice the sum of all spins."""
         return sum(self.twice)
 
+    def reached_f(self, nmin: int, nmax: int) -> range:
+        """All doubled F to which N from `nmin` to `nmax` are coupled."""
+        return range(max(2 * nmin - self.total, self.total % 2), 2 * nmax + self.total + 1, 2)
+
     def patterns(self, twice_f: int) -> Ints:
         """The coupling patterns N, ..., F of one doubled F, doubled."""
         of = {0: patterns, 2: patterns_of_total, 3: patterns_of_three}[self.equivalent]
