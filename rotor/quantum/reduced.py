@@ -74,7 +74,7 @@ def _connects(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> bool:
     if up.moments is not None:
         return low.moments is up.moments and up.moments.connect(up, low, tensors)
     tensors_of_parts = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
-    return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in tensors_of_parts)
+    return any(tensor is not None and tensor.connects(p.basis, q.basis) for tensor, p, q in tensors_of_parts)
 
 
 def wang_amplitudes(up: SolvedBlock, low: SolvedBlock, tensor: BodyTensor) -> Floats:
@@ -101,4 +101,4 @@ def connected_wang_blocks(
 
     A block with itself is among them where a tensor has diagonal elements, as those of even rank do.
     """
-    return pairs_where(blocks, tensor.rank, lambda up, low: tensor.between(up.basis, low.basis) is not None)
+    return pairs_where(blocks, tensor.rank, lambda up, low: tensor.connects(up.basis, low.basis))

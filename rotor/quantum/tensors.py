@@ -154,12 +154,9 @@ class BodyTensor:
         odd = (up.first_k + low.first_k + up.j + low.j + self.rank) % 2
         return up.sign * low.sign == (-1 if odd else 1)
 
-    def between(self, up: WangBlock, low: WangBlock) -> list[float] | None:
-        """Re T_q or Im T_q, q = -K ... K, that acts from `low` to `up`; None where nothing does."""
-        real = self.is_real_between(up, low)
-        if ((up.first_k + low.first_k) % 2, real) not in self._acting:
-            return None
-        return self._halves[real] if abs(up.j - low.j) <= self.rank <= up.j + low.j else None
+    def connects(self, up: WangBlock, low: WangBlock) -> bool:
+        """Whether it acts from `low` to `up`."""
+        return abs(up.j - low.j) <= self.rank <= up.j + low.j and bool(self.signed_parts(up, low)[0])
 
     def signed_parts(self, up: WangBlock, low: WangBlock) -> tuple[list[int], list[float]]:
         """The q that act from `low` to `up`, and the part of each T_q, q = -K ... K, with the sign of the phases of both blocks."""
@@ -214,7 +211,7 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
     ⟨K'‖T‖K⟩ that acts between the blocks. The second term is the first again where K or K' is 0, and else needs
     K + K' ≤ rank.
     """
-    if not abs(up.j - low.j) <= tensor.rank <= up.j + low.j:
+    if not tensor.connects(up, low):
         return []
     rank, (steps, parts) = tensor.rank, tensor.signed_parts(up, low)
     out, folded = [], folded_places(up.first_k, low.first_k, rank)

@@ -49,7 +49,7 @@ def tensor_elements(up, low, tensor):
         part = tensor.components[tensor.rank + q]
         values = coupling(low.j, up.j, tensor.rank, q, [low.axial_k])[:, None]
         return (abs(part) if q else part.real) * values if part else None
-    return None if tensor.between(up, low) is None else block_elements(up, low, tensor)
+    return block_elements(up, low, tensor) if tensor.connects(up, low) else None
 
 
 def operator_elements(operator, up, low):

@@ -144,10 +144,7 @@ class SolvedSpace(FieldSpace):
                 first, second = self.sectors[a], self.sectors[b]
                 if first.vt != second.vt or (up == low and a < b):
                     continue
-                if (
-                    self.m_is_good
-                    or self._space_tensor(operator).between(first.projections, second.projections) is not None
-                ):
+                if self.m_is_good or self._space_tensor(operator).connects(first.projections, second.projections):
                     pairs.setdefault(a, []).append((b, odd))
         return pairs
 

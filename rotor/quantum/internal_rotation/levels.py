@@ -30,7 +30,7 @@ from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesL
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, levels_table, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
-from rotor.quantum.spins.scheme import Rotor
+from rotor.quantum.spins.scheme import Fixed, Rotor
 from rotor.quantum.tensors import BodyTensor, Tensors
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
@@ -75,10 +75,10 @@ class TorsionMoments:
 
     def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
         """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
-        if rotor not in self._cache:
+        if not isinstance(rotor, Fixed) and rotor not in self._cache:
             operator = operator_beside_spins(rotor, self.model.frame)
             self._cache[rotor] = self._entries(operator, rotor.rank, rotor.rank == 1)
-        by_blocks = self._cache[rotor]
+        by_blocks = self._between({(0, 0): rotor.tensor}) if isinstance(rotor, Fixed) else self._cache[rotor]
 
         def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
             entries = by_blocks.get((up.basis.number, low.basis.number))

@@ -8,10 +8,9 @@ are one stack. States of a species of internal rotation bring their elements alo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +22,6 @@ from rotor.quantum.spins.scheme import AxialState, Fixed, Rotor
 from rotor.quantum.spins.stack_elements import Pairs, Section, both_signs, rotor_elements
 from rotor.quantum.tensors import Tensors, rank_of
 from rotor.quantum.wang.basis import WangBlock
-
-if TYPE_CHECKING:
-    from rotor.quantum.internal_rotation.levels import TorsionMoments
 
 _REACH, _RISES_OF_K = 2, range(-2, 3)  # largest differences of N and of K that an operator connects
 _LIKE, _SMALL = 1.5, 16  # largest ratio of sizes of blocks that share a stack, and sizes that all do
@@ -62,10 +58,6 @@ class Stack(NamedTuple):
 
 Element = tuple[Section, Section, Floats]
 """Elements (pairs, functions', functions) between two sections."""
-
-
-BetweenStates = Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]
-"""Elements between the states of two blocks, None where there are none."""
 
 
 class Contracted(NamedTuple):
@@ -153,7 +145,7 @@ def operators_of_stacks(
     Between blocks whose N differ by at most `reach`, each pair once, the higher number first: c(p', p) = (-1)^(N'-N) c(p, p').
     """
     if stacks[0].is_species:
-        return [list(_between_species(stacks, reach, partial(_species_pieces, pieces))) for pieces in operators]
+        return [list(_between_species(stacks, reach, pieces)) for pieces in operators]
     out: list[list[Contracted]] = [[] for _ in operators]
     for up, low, pairs in _near(stacks, reach):
         forward, back = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
@@ -206,7 +198,8 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors, representation:
     """
     rank = rank_of(tensors)
     if stacks[0].is_species:
-        forth = list(_between_species(stacks, rank, partial(_species_tensor, tensors)))
+        one_component = _between_species(stacks, rank, [Piece(1.0, Fixed(tensors[0, 0]), 0, 0, 0, 0)])
+        forth = [e._replace(matrices=np.sqrt(e.up.blocks[0].components) * e.matrices) for e in one_component]
         return [e.turned((-1.0) ** (e.pairs.rise + rank * e.up.blocks[0].combined)) for e in forth] + forth
     both = {(w, v): tensor for (v, w), tensor in tensors.items()} | dict(tensors)
     alike = all(both[w, v] == tensor for (v, w), tensor in both.items())
@@ -214,46 +207,25 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors, representation:
     return pieces_in_both_orders(stacks, pieces, (-1.0) ** rank if alike else None, representation)
 
 
-def _between_species(
-    stacks: Sequence[Stack], reach: int, operator: Callable[[TorsionMoments], BetweenStates]
-) -> Iterator[Contracted]:
+def _between_species(stacks: Sequence[Stack], reach: int, pieces: Sequence[Piece]) -> Iterator[Contracted]:
     """Elements between states of species whose N differ by at most `reach`, each pair of blocks once, the higher number first."""
     for up, low, pairs in _near(stacks, reach):
         moments = up.blocks[0].moments
         if moments is None or moments is not low.blocks[0].moments:
             continue
-        between = operator(moments)
-        each = [
-            between(up.blocks[a], low.blocks[b]) for a, b in zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
+        operators = [(piece.value, moments.beside_spins(piece.rotor)) for piece in pieces]
+        acting = [
+            (place, value * block)
+            for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True))
+            for value, elements in operators
+            if (block := elements(up.blocks[a], low.blocks[b])) is not None
         ]
-        acting = [(place, block) for place, block in enumerate(each) if block is not None]
         if acting:
-            shape = len(each), max(up.sizes), max(low.sizes)
-            matrices = np.zeros(shape, dtype=np.result_type(*(block.dtype for _, block in acting)))
+            shape = len(pairs.up), max(up.sizes), max(low.sizes)
+            matrices = np.zeros(shape, dtype=np.result_type(*{block.dtype for _, block in acting}))
             for place, block in acting:
-                matrices[place, : block.shape[0], : block.shape[1]] = block
+                matrices[place, : block.shape[0], : block.shape[1]] += block
             yield Contracted(up, low, pairs, matrices)
-
-
-def _species_pieces(pieces: Sequence[Piece], moments: TorsionMoments) -> BetweenStates:
-    """Elements of a sum of pieces between states of a species."""
-    operators = [(piece.value, moments.beside_spins(piece.rotor)) for piece in pieces]
-
-    def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-        acting = [value * block for value, elements in operators if (block := elements(up, low)) is not None]
-        return np.asarray(sum(acting)) if acting else None
-
-    return between
-
-
-def _species_tensor(tensors: Tensors, moments: TorsionMoments) -> BetweenStates:
-    """Elements of a tensor between states of a species, times the root of their number of components."""
-
-    def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-        acts = moments.connect(up, low, tensors)
-        return np.asarray(np.sqrt(up.components) * moments.reduced(up, low, tensors)) if acts else None
-
-    return between
 
 
 def within_blocks(stack: Stack, matrices: Sequence[Floats]) -> Contracted:
