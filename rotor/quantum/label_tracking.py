@@ -1,8 +1,7 @@
 """Named states of linear blocks while constants change.
 
-A state is named by the sub-block (a Wang block of one state v, and one pattern of coupling) that has most of it, and within a sub-block by
-the order of energy. As long as these are what they were at the start, state n stays state n; where they are not, the names are made
-anew; see `Follows` for what is looked at.
+A state is named by its dominant sub-block (a Wang block of one state v, and one pattern of coupling), and within a sub-block by the order
+of energy. While these are those of the start, state n keeps its name; else the states of the block are named again (`Follows`).
 """
 
 from __future__ import annotations
@@ -46,11 +45,10 @@ Namer = Callable[
 
 
 class Follows(Enum):
-    """From what it is known that a state still has its name, without making the names anew.
+    """What shows that a state keeps its name, so that its block is not named again.
 
-    MOSTLY : from the sub-block that has at least 0.8 of it, and its rank by energy in that
-    GROUPS : names are given by sub-blocks, the largest shares first, each as many as it has functions, and by energy in these
-    NOTHING : names are always made anew
+    MOSTLY: the sub-block with a share of at least 0.8, and the rank by energy in it. GROUPS: sub-blocks, largest shares first, each for as
+    many states as it has functions, and energy in these. NOTHING: states are always named again.
     """
 
     MOSTLY = 1
@@ -59,7 +57,7 @@ class Follows(Enum):
 
 
 class NamedFunctions(NamedTuple):
-    """How states get names after functions: the number of the sub-block of every function (functions,), and by what rule."""
+    """The number of the sub-block of each function (functions,), and the rules by which states are named."""
 
     sub_blocks: Ints
     namer: Namer
@@ -70,7 +68,6 @@ Naming = Callable[[Sequence[tuple[int, WangBlock]], str], NamedFunctions]  # sta
 
 
 NamedBlock = tuple[LinearBlock, NamedFunctions]
-"""A block of which states have names, and how."""
 
 
 class Tracked(NamedTuple):
@@ -144,8 +141,7 @@ def _names(named: NamedFunctions, matrix: Floats, energies: Floats, vectors: Flo
 
 
 def _leading(members: Floats, energies: Floats, vectors: Floats) -> tuple[Ints, Floats]:
-    """The sub-block with the largest share of each state, (blocks, size), and that share; of two states that round-off alone tells
-    apart the lower number first, whichever way round they come."""
+    """For each state (blocks, size) the dominant sub-block and its share; degenerate states (within round-off) are ordered by sub-block."""
     if members.shape[1] == 1 or members.shape[2] == 1:
         return np.zeros(energies.shape, dtype=np.int64), np.ones(energies.shape)
     shares = members @ vectors**2
@@ -171,8 +167,11 @@ def _padded(rows: Sequence[Ints], fill: int) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class _Labelled:
-    """Blocks side by side with the labels in them: members (blocks, sub-blocks, functions), 1 where a function is in a sub-block; rows
-    (blocks, labels), the place behind all where padded; states (blocks, labels)."""
+    """Blocks side by side with their labels.
+
+    members: 1 where a function is in a sub-block, (blocks, sub-blocks, functions). rows, states: of the labels, (blocks, labels), padded
+    with -1 and 0.
+    """
 
     stack: LinearStack
     members: Floats
@@ -200,8 +199,7 @@ class _Labelled:
         return np.take_along_axis(energies, states, axis=1), self.stack.slopes(vectors, states, space)
 
     def _states(self, energies: Floats, vectors: Floats, matrices: Floats) -> Ints:
-        """The states that have the labels now; names are made anew where a state is mostly in another sub-block, and where sub-blocks
-        share one now or did so at the start: names are those of these constants, whatever the way to them was."""
+        """The states (blocks, labels) of the labels. Interacting states are named from the current constants."""
         leading, shares = _leading(self.members, energies, vectors)
         moved = self._unclear_at_start | self._unclear(leading, shares)
         if (self._below & (leading != self.leading)).any():
@@ -236,8 +234,10 @@ class _Labelled:
         return {what: np.array([block.named.follows is what for block in self.tracked]) for what in Follows}
 
     def _shared(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
-        """Blocks (blocks,) in which sub-blocks lead other numbers of states than they have functions, so that some states up to the
-        highest with a label may be given to another one than leads."""
+        """Blocks (blocks,) in which a labelled state may be assigned to another sub-block than the dominant one.
+
+        That is where sub-blocks dominate more or fewer states than they have functions.
+        """
         sizes = self.members.sum(axis=2)
         shared = (_counts(leading, self._inside, sizes.shape[1]) != sizes).any(axis=1)
         if shared.any():
@@ -257,10 +257,7 @@ class _Labelled:
         return np.asarray(np.arange(self.stack.size) <= highest[:, None])
 
     def _ranks(self, leading: Ints) -> Ints:
-        """The sub-blocks of the labelled states and their places by energy in these, as one number each (blocks, labels).
-
-        What becomes of states above, such as doublets that nothing splits, has no bearing.
-        """
+        """Sub-block and rank by energy in it of the labelled states, as one number (blocks, labels); states above them do not count."""
         if self.members.shape[1] == 1:
             return np.zeros_like(self.states)
         leading_function = np.take_along_axis(leading, self.states, axis=1)
@@ -285,23 +282,10 @@ class AssignedLevels(NamedTuple):
     columns: Ints
     blocks: LevelBlocks
 
-    @property
-    def with_level(self) -> Ints:
-        """Places of the labels that have a level."""
-        return self.rows[self.blocks.with_level] if isinstance(self.blocks, TrackedLevels) else self.rows
-
-
-def without_level(parts: Sequence[AssignedLevels], count: int) -> NDArray[np.bool_]:
-    """Which of `count` labels have no level in any of these blocks."""
-    missing = np.ones(count, dtype=bool)
-    for part in parts:
-        missing[part.with_level] = False
-    return missing
-
 
 @dataclass(frozen=True)
 class TrackedLevels(LevelModel):
-    """Blocks of named parameters and the labels in them; others: parts of which each label is solved among functions near it or is one."""
+    """Blocks of named parameters and the labels in them. others: parts without blocks, solved label by label."""
 
     names: tuple[str, ...]
     count: int
@@ -321,9 +305,12 @@ class TrackedLevels(LevelModel):
         return cls(names, count, tuple(tracked), others)
 
     @property
-    def with_level(self) -> Ints:
-        """Places of the labels that were found."""
-        return np.concatenate([block.rows for block in self.tracked]) if self.tracked else np.zeros(0, dtype=np.int64)
+    def without_level(self) -> NDArray[np.bool_]:
+        """Which labels (count,) have no level in these blocks."""
+        missing = np.ones(self.count, dtype=bool)
+        for rows in (*(block.rows for block in self.tracked), *(part.rows for part in self.others)):
+            missing[rows] = False
+        return missing
 
     def moved(self, rows: Ints, columns: Ints) -> Iterator[Tracked]:
         """The blocks with other places of labels and of parameters."""

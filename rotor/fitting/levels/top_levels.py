@@ -75,7 +75,7 @@ def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, n
     )
     values = np.array(list(begin.values.values()))
     blocks = labelled_states(begin.top, begin.effects, names, labels_by_row, values)
-    _refuse(begin, labels, ~np.isin(np.arange(len(labels)), blocks.with_level))
+    _refuse(begin, labels, blocks.without_level)
     return blocks
 
 
@@ -83,7 +83,7 @@ def _levels_with_spins(
     begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
 ) -> LevelModel:
     from rotor.quantum.estimates.effect_units import assigned_with_spins  # with all that spins need
-    from rotor.quantum.label_tracking import TrackedLevels, without_level
+    from rotor.quantum.label_tracking import TrackedLevels
 
     total = begin.quanta[-1]
     doubled = columns[total] if total in begin.halves else 2 * columns[total]
@@ -94,8 +94,9 @@ def _levels_with_spins(
 
     values = np.array(list(begin.values.values()))
     parts = assigned_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
-    _refuse(begin, labels, without_level(parts, len(labels)))
-    return TrackedLevels.from_parts(names, parts, len(labels))
+    blocks = TrackedLevels.from_parts(names, parts, len(labels))
+    _refuse(begin, labels, blocks.without_level)
+    return blocks
 
 
 def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:

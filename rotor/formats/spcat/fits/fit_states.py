@@ -45,7 +45,7 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.blocks.connected import connected_parts
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.estimates.effect_units import Functions, assigned_with_spins, unit_levels
-from rotor.quantum.label_tracking import AssignedLevels, TrackedLevels, labelled_states, without_level
+from rotor.quantum.label_tracking import AssignedLevels, TrackedLevels, labelled_states
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
@@ -140,8 +140,7 @@ class FileLevels(LevelModel):
         reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, dtype=np.int64)
         if len(reduced):
             refuse_far_f(labels, reduced, form, quanta_names(form), max(sum(group.spins) for group in groups))
-        names, parts = line_names(file), _searched(file, groups, form, labels, reduced)
-        return cls(names, TrackedLevels.from_parts(names, parts, len(labels)), reduced, excluded_parameters(file))
+        return cls(line_names(file), _searched(file, groups, form, labels, reduced), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies and derivatives, see `LevelModel`."""
@@ -153,18 +152,17 @@ class FileLevels(LevelModel):
         return energies, slopes
 
 
-def _searched(
-    file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints
-) -> list[AssignedLevels]:
+def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints) -> TrackedLevels:
     """Assign the labels to the levels of the groups; `reduced` labels have F below 0."""
     positive = labels.copy()
     positive[reduced, -1] = -spelled_out(labels[reduced], form) if len(reduced) else 0
     names, values = line_names(file), np.array([p.value for p in file.parameters])
     while True:
         parts = [part for group in groups for part in _with_labels(group, form, positive, names, values)]
-        lost = np.flatnonzero(without_level(parts, len(labels)))
+        levels = TrackedLevels.from_parts(names, parts, len(labels))
+        lost = np.flatnonzero(levels.without_level)
         if not len(lost):
-            return parts
+            return levels
         none = lost[~np.isin(lost, reduced) | (positive[lost, -1] >= HIGHEST_SEARCHED)]
         if len(none):
             raise _no_level(labels, none, f" ({', '.join(quanta_names(form))}) in this model")
