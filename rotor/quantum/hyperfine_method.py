@@ -1,4 +1,4 @@
-"""How spins are treated: exactly, with N as a good quantum number, or to first order: what is asked for, and what was used."""
+"""How spins are treated: exactly, with N as a good quantum number, or to first order; as requested, and as used."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def are_with_spins(levels: Levels) -> bool:
 
 @dataclass(frozen=True)
 class HyperfineMethod(QuantumEffect):
-    """Which method is asked for: "exact", "N-diagonal", "first-order", or "auto", the cheapest that is estimated to keep a tolerance.
+    """The requested method: "exact", "N-diagonal", "first-order", or "auto", the cheapest with an estimated error within a tolerance.
 
     coupled: the spins that the other effects couple.
     """
@@ -56,7 +56,7 @@ class HyperfineMethod(QuantumEffect):
 
 
 def used_method(levels: Levels) -> Used | None:
-    """What was used for levels with spins; None without spins, and where nothing was asked, which means exact."""
+    """The method of levels with spins; None without spins, and where none was requested, which means exact."""
     spins = levels.blocks[0].spins if levels.blocks else None
     return None if spins is None else spins.shared.used
 

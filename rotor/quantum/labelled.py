@@ -1,8 +1,7 @@
-"""Chosen levels and their derivatives for constants that change: what a fit asks for, again and again.
+"""Labelled levels and their derivatives as functions of the constants, for fits.
 
-A model is made once for the labels that occur. Linear, spherical and symmetric tops have E = Σ c x(label): the derivatives are
-a constant matrix. An asymmetric top is solved in those Wang blocks alone in which a label lies, side by side (`linear_stacks`). A label is
-(J, block, rank in the order of energy), so that it never changes its state by accident; `overlaps` says where a state has become another.
+Linear, spherical and symmetric tops have E = Σ c x(label), with constant derivatives. An asymmetric top is solved in the Wang blocks that
+contain a label, side by side (`linear_stacks`). A label is (J, block, rank by energy); `overlaps` tells where its state has changed.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ AT_ZERO_MHZ = 1e-30  # in place of 0: a free constant that starts there must not
 
 
 class MissingLevelsError(ValueError):
-    """Labels that no level has: their places (n,) among those asked for."""
+    """Labels that no level has. places: (n,) among all labels."""
 
     def __init__(self, text: str, places: Ints) -> None:
         super().__init__(text)
@@ -37,10 +36,7 @@ class MissingLevelsError(ValueError):
 
 
 class LevelModel(ABC):
-    """Energies of labelled levels as a function of constants.
-
-    names : the constants, in the order in which values are given and derivatives come
-    """
+    """Energies of labelled levels as a function of constants, which have the order of `names`."""
 
     names: tuple[str, ...]
 
@@ -111,8 +107,7 @@ class ClosedForm(LevelModel):
 
 
 class _Labels(NamedTuple):
-    """Wang blocks of like size side by side, the places of the labels in them (blocks, most labels), the one behind all where padded, and
-    which states they are."""
+    """Wang blocks of similar size side by side. rows, states: of the labels, (blocks, labels); padded rows follow the last."""
 
     stack: LinearStack
     rows: Ints

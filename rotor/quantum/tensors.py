@@ -138,17 +138,6 @@ class BodyTensor:
                 f"components {self.components}: a tensor with real Cartesian components has T_-q = (-1)^q T_q*"
             )
 
-    @cached_property
-    def _halves(self) -> dict[bool, list[float]]:
-        """Re T_q by True, Im T_q by False."""
-        return {True: [part.real for part in self.components], False: [part.imag for part in self.components]}
-
-    @cached_property
-    def _acting(self) -> set[tuple[int, bool]]:
-        """Which of (even or odd q, real or imaginary part) are not zero."""
-        halves = self._halves.items()
-        return {(q % 2, real) for real, half in halves for q, value in enumerate(half, -self.rank) if value}
-
     def is_real_between(self, up: WangBlock, low: WangBlock) -> bool:
         """Whether Re T_q acts from `low` to `up`: the product of their characters under C2y is (-1)^K. Else Im T_q does."""
         odd = (up.first_k + low.first_k + up.j + low.j + self.rank) % 2
@@ -167,17 +156,16 @@ class BodyTensor:
 
     @cached_property
     def _signed(self) -> dict[tuple[int, ...], tuple[list[int], list[float]]]:
-        """What `signed_parts` has found: it depends on J modulo 4 only, and a line list asks for thousands of pairs of blocks."""
+        """Signed parts by first K, sign and J modulo 4 of both blocks, of which a line list has thousands of pairs."""
         return {}
 
     def _with_sign(self, up: WangBlock, low: WangBlock) -> tuple[list[int], list[float]]:
         real, odd = self.is_real_between(up, low), (up.first_k + low.first_k) % 2
-        if (odd, real) not in self._acting:
-            return [], []
         sign = -1.0 if (phase_exponent(low) - phase_exponent(up) + (not real) - self.rank % 2) % 4 else 1.0
-        parts = [sign * part for part in self._halves[real]]
+        parts = [sign * (part.real if real else part.imag) for part in self.components]
         steps = range(-self.rank + (self.rank + odd) % 2, self.rank + 1, 2)
-        return [q for q in steps if parts[self.rank + q] or self.rank > 1], parts
+        acts = any(parts[self.rank + q] for q in steps)
+        return [q for q in steps if acts and (parts[self.rank + q] or self.rank > 1)], parts
 
 
 def body_tensor(cartesian: ArrayLike, rank: int, representation: str) -> BodyTensor:

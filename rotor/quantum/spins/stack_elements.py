@@ -40,6 +40,10 @@ class Section(NamedTuple):
     rows: slice
     parts: tuple[Part, ...]
 
+    def blocks(self, places: Ints) -> tuple[WangBlock, ...]:
+        """The Wang blocks at some places of the stack."""
+        return tuple([self.parts[place].basis for place in places.tolist()])
+
 
 class Pairs(NamedTuple):
     """Pairs of blocks of two stacks: places in the stacks (pairs,), and N' and N as columns (pairs, 1).
@@ -110,21 +114,16 @@ def elements_of_pair(rotor: Rotor, up: WangBlock, low: WangBlock, representation
 
 def _factors_of_pairs(factors: SpeciesFactors, left: Section, right: Section, pairs: Pairs) -> Floats:
     """The factor of the species of each pair of blocks, (pairs, 1, 1)."""
-    up, low = (
-        np.array([SPECIES.index(section.parts[place].basis.species) for place in places.tolist()])
-        for section, places in ((left, pairs.up), (right, pairs.low))
-    )
+    blocks = left.blocks(pairs.up), right.blocks(pairs.low)
+    up, low = ([SPECIES.index(block.species) for block in each] for each in blocks)
     return np.asarray(np.array(factors)[up, low][:, None, None])
 
 
 def _elements_of_operator(rotor: ByElements, left: Section, right: Section, pairs: Pairs) -> Floats | None:
     """Elements of any operator between two sections."""
-    up, low = (
-        tuple([section.parts[place].basis for place in places.tolist()])
-        for section, places in ((left, pairs.up), (right, pairs.low))
-    )
     shifts = [each for each in rotor.operator.shifts if dict(each.change).get("J", 0) == pairs.rise]
-    elements, _ = _between_functions(up, low).elements(Operator(tuple(shifts)))
+    between = _between_functions(left.blocks(pairs.up), right.blocks(pairs.low))
+    elements, _ = between.elements(Operator(tuple(shifts)))
     if not len(elements.rows):
         return None
     out = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
