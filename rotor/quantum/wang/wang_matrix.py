@@ -63,10 +63,9 @@ def _elements_of_order(operators: Operators, js: Sequence[int], k: Ints, n: int,
     """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p: (J, K)."""
     powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n]
     coefficients = np.zeros((len(js), 1 + max((q for _, q, _ in powers), default=0)))
-    for row, j in enumerate(js):
-        x = float(j * (j + 1))
-        for p, q, c in powers:
-            coefficients[row, -1 - q] += c * x**p
+    x = np.array(js) * (np.array(js) + 1.0)
+    for p, q, c in powers:
+        coefficients[:, -1 - q] += c * x**p
 
     squares = np.arange(k[0], k[-1] + 2 * n + 1.0) ** 2
     values = np.repeat(coefficients[:, :1], len(squares), axis=1)
@@ -225,6 +224,9 @@ def unit_diagonals(
     k, steps = _steps(js, order)
     out = tuple(np.zeros((*rows.k.shape, len(units))) for _ in range(order + 1))
     for place, (q, n) in enumerate(units):
+        if (q, n) == (0, 0):
+            out[0][:, :, place] = np.arange(rows.k.shape[1]) < rows.sizes
+            continue
         elements = _elements_of_order({(0, q, n): 1.0}, js, k, n, steps)
         rows.add(elements, n, order, [diagonal[:, :, place] for diagonal in out])
     return out
