@@ -125,27 +125,19 @@ def lever_tensor(forces: Floats, arms_to: Floats, arms_from: Floats, first_site:
     return tensor
 
 
-@kernel(error_model="numpy", fastmath=FAST)
-def _lennard_jones(row: Floats, n: int, x: float, y: float, z: float, c12: float, c6: float, cut: Floats) -> Any:
-    """S(r) (c12/r¹² - c6/r⁶), S = 1 - t³ (10 - 15 t + 6 t²), t = (r - r_s)/(r_c - r_s) clamped to 0..1; cut = r_c², r_s, 1/(r_c - r_s)."""
-    limit, begin, slope = cut[0], cut[1], cut[2]
+@kernel(inline="always", error_model="numpy", fastmath=FAST)
+def _over_neighbours(pair: Any, row: Any, n: int, x: float, y: float, z: float, strength: Any, form: Any) -> Any:
+    """Force on a site and energy with all neighbours, whose forces are added in `row`.
+
+    pair(r², strength, form) is -U'/r and U; form begins with the squared cutoff.
+    """
     fx, fy, fz, energy = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
         dx, dy, dz = row[k] - x, row[LANES + k] - y, row[2 * LANES + k] - z
         square = dx * dx + dy * dy + dz * dz
-        inverse = 1.0 / square
-        six = inverse * inverse * inverse
-        attraction, repulsion = c6 * six, c12 * six * six
-        root = np.sqrt(square)
-        t = (root - begin) * slope
-        t = t if t > 0.0 else 0.0
-        t = t if t < 1.0 else 1.0
-        switch = 1.0 - t * t * t * (10.0 - t * (15.0 - 6.0 * t))
-        fall = 30.0 * t * t * (1.0 - t) * (1.0 - t) * slope
-        bare = repulsion - attraction
-        g = switch * (12.0 * repulsion - 6.0 * attraction) * inverse + fall * bare * root * inverse
-        g = g if square < limit else 0.0
-        energy += switch * bare if square < limit else 0.0
+        g, u = pair(square, strength, form)
+        g = g if square < form[0] else 0.0
+        energy += u if square < form[0] else 0.0
         gx, gy, gz = g * dx, g * dy, g * dz
         fx -= gx
         fy -= gy
@@ -154,28 +146,42 @@ def _lennard_jones(row: Floats, n: int, x: float, y: float, z: float, c12: float
         row[4 * LANES + k] += gy
         row[5 * LANES + k] += gz
     return fx, fy, fz, energy
+
+
+@kernel(inline="always", error_model="numpy", fastmath=FAST)
+def _lennard_jones_pair(square: Any, strength: Any, cut: Any) -> Any:
+    c12, c6 = strength
+    _, begin, slope = cut
+    inverse = 1.0 / square
+    six = inverse * inverse * inverse
+    attraction, repulsion = c6 * six, c12 * six * six
+    root = np.sqrt(square)
+    t = (root - begin) * slope
+    t = t if t > 0.0 else 0.0
+    t = t if t < 1.0 else 1.0
+    switch = 1.0 - t * t * t * (10.0 - t * (15.0 - 6.0 * t))
+    fall = 30.0 * t * t * (1.0 - t) * (1.0 - t) * slope
+    bare = repulsion - attraction
+    return switch * (12.0 * repulsion - 6.0 * attraction) * inverse + fall * bare * root * inverse, switch * bare
+
+
+@kernel(error_model="numpy", fastmath=FAST)
+def _lennard_jones(row: Floats, n: int, x: float, y: float, z: float, c12: float, c6: float, cut: Floats) -> Any:
+    """S(r) (c12/r¹² - c6/r⁶), S = 1 - t³ (10 - 15 t + 6 t²), t = (r - r_s)/(r_c - r_s) clamped to 0..1; cut = r_c², r_s, 1/(r_c - r_s)."""
+    return _over_neighbours(_lennard_jones_pair, row, n, x, y, z, (c12, c6), (cut[0], cut[1], cut[2]))
+
+
+@kernel(inline="always", error_model="numpy", fastmath=FAST)
+def _reaction_field_pair(square: Any, qq: Any, field: Any) -> Any:
+    _, k, c = field
+    inverse = 1.0 / np.sqrt(square)
+    return qq * (inverse * inverse * inverse - 2.0 * k), qq * (inverse + k * square - c)
 
 
 @kernel(error_model="numpy", fastmath=FAST)
 def _reaction_field(row: Floats, n: int, x: float, y: float, z: float, qq: float, field: Floats) -> Any:
     """qq (1/r + k r² - c); field = r_c², k, c."""
-    limit, k_field, c_field = field[0], field[1], field[2]
-    twice = 2.0 * k_field
-    fx, fy, fz, energy = 0.0, 0.0, 0.0, 0.0
-    for k in range(n):
-        dx, dy, dz = row[k] - x, row[LANES + k] - y, row[2 * LANES + k] - z
-        square = dx * dx + dy * dy + dz * dz
-        inverse = 1.0 / np.sqrt(square)
-        g = qq * (inverse * inverse * inverse - twice) if square < limit else 0.0
-        energy += qq * (inverse + k_field * square - c_field) if square < limit else 0.0
-        gx, gy, gz = g * dx, g * dy, g * dz
-        fx -= gx
-        fy -= gy
-        fz -= gz
-        row[3 * LANES + k] += gx
-        row[4 * LANES + k] += gy
-        row[5 * LANES + k] += gz
-    return fx, fy, fz, energy
+    return _over_neighbours(_reaction_field_pair, row, n, x, y, z, qq, (field[0], field[1], field[2]))
 
 
 @kernel(inline="always", error_model="numpy", fastmath=FAST)
@@ -219,27 +225,21 @@ def gauss_and_erfc(x: Any) -> Any:
     return g, g * p * (x + 3.75) * over
 
 
+@kernel(inline="always", error_model="numpy", fastmath=FAST)
+def _screened_pair(square: Any, qq: Any, field: Any) -> Any:
+    _, b, c, alpha, slope, cutoff = field
+    inverse = 1.0 / np.sqrt(square)
+    distance = square * inverse
+    gauss, screen = gauss_and_erfc(alpha * distance)
+    force = ((screen * inverse + slope * gauss) * inverse - b) * inverse
+    return qq * force, qq * (screen * inverse - c + b * (distance - cutoff))
+
+
 @kernel(error_model="numpy", fastmath=FAST)
 def _screened(row: Floats, n: int, x: float, y: float, z: float, qq: float, field: Floats) -> Any:
     """qq [erfc(αr)/r - c + b (r - r_c)]; field = r_c², b, c, α, 2α/√π, r_c; b = c = 0 is Ewald's part in real space."""
-    limit, b, c, alpha, slope, cutoff = field[0], field[1], field[2], field[3], field[4], field[5]
-    fx, fy, fz, energy = 0.0, 0.0, 0.0, 0.0
-    for k in range(n):
-        dx, dy, dz = row[k] - x, row[LANES + k] - y, row[2 * LANES + k] - z
-        square = dx * dx + dy * dy + dz * dz
-        inverse = 1.0 / np.sqrt(square)
-        distance = square * inverse
-        gauss, screen = gauss_and_erfc(alpha * distance)
-        g = qq * ((screen * inverse + slope * gauss) * inverse - b) * inverse if square < limit else 0.0
-        energy += qq * (screen * inverse - c + b * (distance - cutoff)) if square < limit else 0.0
-        gx, gy, gz = g * dx, g * dy, g * dz
-        fx -= gx
-        fy -= gy
-        fz -= gz
-        row[3 * LANES + k] += gx
-        row[4 * LANES + k] += gy
-        row[5 * LANES + k] += gz
-    return fx, fy, fz, energy
+    form = (field[0], field[1], field[2], field[3], field[4], field[5])
+    return _over_neighbours(_screened_pair, row, n, x, y, z, qq, form)
 
 
 @kernel(inline="always", error_model="numpy")
