@@ -59,7 +59,11 @@ SETTLING_STEPS, SHORT_STEPS = 50, (5, 20)  # after which forces are nearly those
 
 
 def with_box(request: FluidRequest) -> FluidRequest:
-    """The request with its box, which is made once."""
+    """The request with its box, which is made once; ValueError for an engine whose settings are not known here."""
+    if request.engine != "rotor":
+        raise ValueError(
+            f"numerics.engine {request.engine}: an accuracy, its cost and a plan are those of the engine rotor alone"
+        )
     if not isinstance(request.box, NewBox):
         return request
     box = make_box(request)
@@ -67,18 +71,11 @@ def with_box(request: FluidRequest) -> FluidRequest:
     return replace(request, box=box, box_source=request.start)
 
 
-def _other_engine(request: FluidRequest) -> str:
-    """Why an accuracy does not suit a request: only settings of the engine rotor are chosen."""
-    if request.engine == "rotor":
-        return ""
-    return f"not available for the engine {request.engine}; give numerics.step, or use the engine rotor"
-
-
 def _other_forces(request: FluidRequest) -> str:
     """Why an accuracy of Ewald's forces does not suit a request."""
     other = request.settings.electrostatics
-    if _other_engine(request) or other == "ewald":
-        return _other_engine(request)
+    if other == "ewald":
+        return ""
     return (
         f"of the forces is that of Ewald's sum, and {other} is another model; give "
         'numerics.electrostatics = "ewald", or an accuracy of the conserved energy in K'
@@ -132,13 +129,6 @@ def force_error(request: FluidRequest) -> float:
         for tolerance in (settings.ewald_tolerance, REFERENCE_EWALD)
     )
     return force_difference(forces, reference)
-
-
-def _swept_box(request: FluidRequest) -> FluidRequest:
-    """The request with its box; ValueError for an engine whose settings are not swept."""
-    if request.engine != "rotor":
-        raise ValueError(f"numerics.engine {request.engine}: only the settings of the engine rotor are swept")
-    return with_box(request)
 
 
 def followed(request: FluidRequest, step_fs: float) -> FluidRequest:
@@ -306,8 +296,6 @@ def _short_run(request: Any, steps: int) -> Any:
 
 def _planned_box(request: Any) -> Any:
     """The request with its box."""
-    if request.engine != "rotor":
-        raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
     return replace(with_box(request), box_equilibration_ps=request.equilibration_ps)
 
 
@@ -364,11 +352,11 @@ def _force_error_at_end(answer: Any) -> float:
 
 FLUID = Numerics(
     {
-        "K": Goal("conserved energy", conserved_k, _other_engine, with_box),
+        "K": Goal("conserved energy", conserved_k, prepare=with_box),
         "%": Goal("forces", _force_error_at_end, _other_forces, with_box),
     },
     bare=False,
     knobs=(STEP, *map(_cutoff, ELECTROSTATICS), SUM, LENGTH),
-    prepare=_swept_box,
+    prepare=with_box,
     describe=describe_fluid,
 )

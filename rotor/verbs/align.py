@@ -79,29 +79,21 @@ def read_pulses(typed: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _pulse_of_table(path: str, axis: Axis) -> Pulse:
-    names, rows = _rows(path)
-    columns = ("t_ps", "intensity_w_per_cm2")
-    if not set(columns) <= set(names):
-        raise ValueError(f"{path}: expected the columns {', '.join(columns)}; found {', '.join(names)}")
-    table = np.array(rows).reshape(len(rows), len(names))
-    return TabulatedPulse(table[:, names.index(columns[0])], table[:, names.index(columns[1])], axis)
-
-
-def _rows(path: str) -> tuple[list[str], list[list[float]]]:
+    """A pulse from the columns t_ps and intensity_w_per_cm2 of a CSV file."""
     import csv
 
     with open(path, newline="", encoding="utf-8-sig") as handle:
-        lines = [line for line in csv.reader(handle) if line and not line[0].startswith("#")]
-    if not lines:
-        raise ValueError(f"{path}: the file is empty; expected the columns t_ps and intensity_w_per_cm2")
-    names = [name.strip() for name in lines[0]]
+        reader = csv.DictReader(line for line in handle if line.strip() and not line.startswith("#"))
+        rows, names = list(reader), [name.strip() for name in reader.fieldnames or ()]
+    columns = ("t_ps", "intensity_w_per_cm2")
+    if not set(columns) <= set(names):
+        raise ValueError(f"{path}: expected the columns {', '.join(columns)}; found {', '.join(names) or 'none'}")
     try:
-        rows = [[float(cell) for cell in line] for line in lines[1:]]
-    except ValueError as error:
-        raise ValueError(f"{path}: expected numbers in every row after the first ({error})") from None
-    if any(len(row) != len(names) for row in rows):
-        raise ValueError(f"{path}: expected {len(names)} numbers in every row, as many as there are columns")
-    return names, rows
+        table = np.array([list(map(float, row.values())) for row in rows]).reshape(len(rows), len(names))
+    except (TypeError, ValueError):
+        raise ValueError(f"{path}: expected {len(names)} numbers in every row after the first") from None
+    times, intensities = (table[:, names.index(name)] for name in columns)
+    return TabulatedPulse(times, intensities, axis)
 
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:

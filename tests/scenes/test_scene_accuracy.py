@@ -202,7 +202,7 @@ REFUSED = [
     ),
     (
         make_scene("fluid", conditions={"molecules": 27}, numerics={"engine": "openmm"}, accuracy="1 K"),
-        "not available for the engine openmm",
+        "numerics.engine openmm: an accuracy, its cost and a plan are those of the engine rotor alone",
     ),
     (
         make_scene("stark", molecule="OCS", accuracy="1e-12 MHz"),

@@ -69,8 +69,7 @@ def _enough_molecules(sought: Sought) -> list[int]:
     """As many molecules as an accuracy of the temperature (K), the heat capacity (%), or C1 and C2 needs, at most those of a run."""
     from rotor.thermodynamics.gas.classical_gas import MOST_MOLECULES
 
-    request = sought.request
-    deviation = sought.known["deviation"] = quantile(request.confidence) * _spread(request, sought.unit)
+    deviation = sought.known["deviation"] = _deviation(sought.request, sought.unit)
     return [min(max(math.ceil((deviation / sought.accuracy) ** 2), 2), MOST_MOLECULES)]
 
 
@@ -79,16 +78,17 @@ def _count_error(sought: Sought, request: Any, count: int) -> Estimate:
     return Estimate(error, remark=f", at a confidence of {request.confidence:g}")
 
 
-def _spread(request: GasRequest, unit: str) -> float:
-    """Standard error times √N, in the unit of the accuracy."""
+def _deviation(request: GasRequest, unit: str) -> float:
+    """Half-width of the confidence interval times √N, in the unit of the accuracy."""
+    z = quantile(request.confidence)
     if unit:
         scale = request.temperature_k if unit == "K" else 100.0
-        return scale * relative_spread(unit, count_degrees_per_molecule(request))
+        return z * scale * relative_spread(unit, count_degrees_per_molecule(request))
     from rotor.thermodynamics.gas.classical_gas import answer_gas
 
     pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
     # margin: the spread itself has an error of a few percent
-    return 1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)
+    return 1.1 * z * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)
 
 
 def _largest_error(answer: GasAnswer) -> float:
@@ -101,11 +101,9 @@ def _largest_error(answer: GasAnswer) -> float:
 def gas_error(unit: str, answer: GasAnswer) -> float:
     """Half-width of the confidence interval of the result at the requested confidence."""
     request = answer.request
-    z = quantile(request.confidence)
-    if not unit:
-        return z * _largest_error(answer)
-    scale = request.temperature_k if unit == "K" else 100.0
-    return z * scale * relative_spread(unit, count_degrees_per_molecule(request)) / math.sqrt(request.molecules)
+    if unit:
+        return _deviation(request, unit) / math.sqrt(request.molecules)
+    return quantile(request.confidence) * _largest_error(answer)
 
 
 def _mean_square(errors: list[float]) -> float:

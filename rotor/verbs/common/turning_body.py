@@ -176,30 +176,26 @@ class TurningBody(OneMolecule):
     )  # a body may replace it
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """Read the molecule or the body."""
-        body = read_body(entries)
-        return (
-            super().read(entries, place, verb) if body is None else Subject({"body": body}, (), body.text, place.note)
-        )
+        """Read the molecule or the body, and how it moves."""
+        body, motion = read_body(entries), read_instance(MotionInput, entries)
+        if body is not None:
+            return Subject(
+                {"body": body}, (), body.text, place.note, further=(read_instance(BodyInput, entries), motion)
+            )
+        subject = super().read(entries, place, verb)
+        return replace(subject, further=(subject.further, motion))
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The molecule or the body, and its initial motion."""
-        times = {} if request.times is None else {"conditions.times": [float(time) for time in request.times]}
+        """The molecule or the body and its motion as entered; a scene has the momentum of a body in the table of the body."""
+        start, motion = subject.further
         if subject.molecules:
-            kelvin = getattr(request, "temperature_k", None)
-            entered = MotionInput(angular_momentum=request.angular_momentum)
-            start = entered if kelvin is None else MotionInput(temperature_k=kelvin)
-            return saved_molecule(subject.molecules[0], folder) | times | written_fields(start)
-        named = subject.values["body"].named
-        units = "SI" if request.units.time else ""
-        body = BodyInput(body=named) if named else BodyInput(moments=request.moments, units=units)
-        body = replace(body, angular_momentum=request.angular_momentum)
-        if not hasattr(request, "effects"):
-            return written_fields(body) | times
-        attitude = None if request.attitude == AT_REST else request.attitude
-        body = replace(body, angular_velocity=request.angular_velocity, attitude=attitude)
-        settings = {name: getattr(request, name) for name in ("effects", "tolerance", "step", "order")}
-        return written_fields(body) | times | written_fields(MotionInput(**settings))
+            return saved_molecule(subject.molecules[0], folder) | written_fields(start) | written_fields(motion)
+        body = subject.values["body"]
+        if motion.angular_momentum is not None:
+            start = replace(start, angular_momentum=motion.angular_momentum)
+            motion = replace(motion, angular_momentum=None)
+        units = "SI" if start.moments is not None and body.units.time else ""
+        return written_fields(replace(start, body=body.named, units=units)) | written_fields(motion)
 
 
 def read_body(entries: Entries) -> Body | None:
@@ -271,7 +267,7 @@ def _everyday_body(body: NamedBody) -> Body:
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> TumbleRequest | DrivenRequest:
     """The request for a molecule or a body: free motion, or motion under effects."""
-    motion, start = read_instance(MotionInput, entries), read_instance(BodyInput, entries)
+    start, motion = subject.further
     in_scene, is_body = entries.style == "key", "body" in subject.values
     if in_scene and start.angular_momentum is not None:
         motion = replace(motion, angular_momentum=start.angular_momentum)
