@@ -25,7 +25,7 @@ MOLECULE, SPINS, CONDITIONS, OBSERVABLES, NUMERICS, OUTPUT, PICTURE = PANELS = (
 )  # fmt: skip
 _PANEL_OF_TABLE = {
     "molecule": MOLECULE, "effects": SPINS, "conditions": CONDITIONS, "vibration": CONDITIONS, "observables": OBSERVABLES,
-    "numerics": NUMERICS, "outputs": OUTPUT,
+    "numerics": NUMERICS, "outputs": OUTPUT, "family": MOLECULE, "lines": CONDITIONS, "magnetic": CONDITIONS,
 }  # fmt: skip
 OUTPUTS = "outputs."  # table of the files of a scene
 _DECLARED, _PART = "declared", "part"

@@ -13,7 +13,7 @@ from rotor.assignment.request import AssignRequest
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import OBSERVABLES, all_fields, declared
+from rotor.requests.field import all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom, Range, Text
 from rotor.table import counted
@@ -52,16 +52,15 @@ class SpectrumInput:
         "List of peaks, or a spectrum on a grid: .csv, .npy, FITS",
         "spectrum.file",
         option="SPECTRUM",
-        panel=OBSERVABLES,
         example="peaks.csv",
     )
     range_mhz: tuple[float, float] | None = declared(
-        None, Range("MHz"), "Band that was recorded (MHz); by default from the first to the last peak", "spectrum.range",
-        panel=OBSERVABLES, common=True, example="6000:18000 MHz",
+        None, Range("MHz"), "Band that was recorded (MHz); by default from the first to the last peak", "spectrum.range", common=True,
+        example="6000:18000 MHz",
     )  # fmt: skip
     molecule: str | None = declared(
         None, Text(metavar="FILE"), "Geometry of the first species for --isotopologues: a file, a name, SMILES:...",
-        "spectrum.molecule", panel=OBSERVABLES, common=True, example="parent.xyz",
+        "spectrum.molecule", common=True, example="parent.xyz",
     )  # fmt: skip
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
+from rotor.requests.field import NUMERICS, OUTPUT, declared
 from rotor.requests.fill import NamedError
 from rotor.requests.lists import NameList
 from rotor.requests.readers import Flag, Rule, Text, Whole
@@ -37,23 +36,22 @@ EXAMPLES = """\
 MOST_SAMPLES = 100_000  # bootstrap samples; each is a fit
 FORMS = {".txt": "text", ".md": "markdown", ".tex": "latex"}
 CONSTANTS = ("toml", "par", "var")  # outputs that hold the fitted constants
-analysis = partial(declared, panel=OBSERVABLES)  # a field under this heading of --help
 
 
 @dataclass(frozen=True)
 class FitShown(ErrorsShown):
     """Analyses beside the fit, and display options."""
 
-    try_constants: tuple[str, ...] | None = analysis(
+    try_constants: tuple[str, ...] | None = declared(
         None, NameList(), "Test the fit with each of these constants added or removed", option="--try", common=True
     )
-    choose: tuple[str, ...] | None = analysis(
+    choose: tuple[str, ...] | None = declared(
         None, NameList(), "Build the model from these constants, one at a time", common=True
     )
-    all_orders: bool = analysis(
+    all_orders: bool = declared(
         False, Flag(), "With --choose: constants of all orders compete from the first step", rule=Rule(("choose",))
     )
-    suggest: str | None = analysis(
+    suggest: str | None = declared(
         None, Text(metavar="NAME"), "Unmeasured lines that would best determine this constant", common=True
     )
     bootstrap: int = declared(

@@ -23,7 +23,7 @@ from rotor.fluids.settings import Settings
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, declared
+from rotor.requests.field import MOLECULE, OUTPUT, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
@@ -79,7 +79,6 @@ class BoxInput:
         "File of a box, relative to the scene's folder, instead of molecules",
         "conditions.box",
         option="",
-        panel=CONDITIONS,
         example="liquid.traj",
     )
 
@@ -167,12 +166,9 @@ class FluidShown(Shown):
         Whole(1),
         "Steps between frames; by default those between rows",
         "outputs.frames_every",
-        panel=OUTPUT,
         example=100,
     )
-    checkpoint_every: int = declared(
-        1000, Whole(1), "Steps between checkpoints", "outputs.checkpoint_every", panel=OUTPUT
-    )
+    checkpoint_every: int = declared(1000, Whole(1), "Steps between checkpoints", "outputs.checkpoint_every")
     resume: bool = declared(False, Flag(), "Continue from the checkpoint", panel=OUTPUT)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from rotor.quantum.quanta import headings, rotational_quanta
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
-from rotor.requests.field import OBSERVABLES, OUTPUT, changed_fields, declared
+from rotor.requests.field import OUTPUT, changed_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Rule, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
@@ -29,7 +28,6 @@ from rotor.verbs.measurements.over_spectrum import Comparison, draw_loomis_wood,
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0
-option_field = partial(declared, panel=OBSERVABLES)  # a field under this heading of --help
 _FILE_ALONE = ("as_spcat", "full_basis")  # options of .int files
 
 EXAMPLES = """\
@@ -53,18 +51,18 @@ def _hitran_numbers(raw: Any) -> tuple[int, int]:
 class SpectrumShown(LinesShown):
     """Display options of `spectrum`, and options of its files."""
 
-    resolution: float | None = option_field(
+    resolution: float | None = declared(
         None, Quantity("MHz", above=0, metavar="D"), "Show components of a rotational line closer than this (MHz) as one line",
     )  # fmt: skip
-    as_spcat: bool = option_field(
+    as_spcat: bool = declared(
         False, Flag(), "For an .int file: results of SPCAT, also where SPCAT errs (notes say where)"
     )
-    full_basis: bool = option_field(False, Flag(), "For an .int file: every K in the basis, ignoring KNMIN and KNMAX")
-    over: str | None = option_field(
+    full_basis: bool = declared(False, Flag(), "For an .int file: every K in the basis, ignoring KNMIN and KNMAX")
+    over: str | None = declared(
         None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (columns of text, .npy, FITS): --plot draws both",
         common=True,
     )  # fmt: skip
-    tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
+    tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag")
     hitran_id: tuple[int, int] | None = declared(
         None, Custom(_hitran_numbers, metavar="M:I"), "HITRAN's numbers of molecule and isotopologue, such as 5:1",
         panel=OUTPUT, rule=Rule(("outputs.hitran",)),

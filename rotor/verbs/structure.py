@@ -12,7 +12,7 @@ from rotor.formats.fits.structure_request import StructureAnswer, StructureReque
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import MOLECULE, all_fields, declared
+from rotor.requests.field import all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
 from rotor.table import counted
@@ -41,7 +41,6 @@ class FamilyInput:
         "Family of isotopologues (.toml)",
         "family.file",
         option="FAMILY",
-        panel=MOLECULE,
         example="family.toml",
     )
 

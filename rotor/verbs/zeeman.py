@@ -10,7 +10,7 @@ from rotor.frozen import dataclass
 from rotor.quantum.effects.zeeman import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
 from rotor.reports.screen import Table
-from rotor.requests.field import CONDITIONS, all_fields, declared
+from rotor.requests.field import all_fields, declared
 from rotor.requests.fill import Entries, read_instance, within
 from rotor.requests.lists import Numbers
 from rotor.tops.magnetic import MagneticTensors, tensor_for
@@ -37,11 +37,11 @@ class MagneticInput:
 
     g: tuple[float, ...] | None = declared(
         None, Numbers(example="0.6,-0.2,0.3"), "Rotational g tensor along a, b, c: aa,bb,cc[,ab,ac,bc]; parallel,perpendicular; or g",
-        "magnetic.g", common=True, panel=CONDITIONS, example=[-0.03],
+        "magnetic.g", common=True, example=[-0.03],
     )  # fmt: skip
     magnetisability: tuple[float, ...] | None = declared(
         None, Numbers(example="-3,2,-7"), "Magnetisability tensor likewise, with sign, in 1e-6 erg/(G² mol)", "magnetic.magnetisability",
-        panel=CONDITIONS, example=[-3.0, 2.0, -7.0],
+        example=[-3.0, 2.0, -7.0],
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotor.checks import no_molecule
 from rotor.frozen import dataclass
-from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
+from rotor.requests.field import SPINS, all_fields, declared
 from rotor.requests.fill import Entries, naming, within
 from rotor.requests.lists import Numbers, Pairs
 from rotor.requests.readers import Names, Quantity, Text
@@ -140,7 +140,7 @@ class MoleculeInput:
     )  # fmt: skip
     symmetry_tolerance: float | None = declared(
         None, Quantity("Å", above=0, metavar="DISTANCE"), "Displacement of nuclei within which a symmetry is accepted, such as 0.005 (Å)",
-        "molecule.symmetry_tolerance", panel=MOLECULE, example="0.005 Å",
+        "molecule.symmetry_tolerance", example="0.005 Å",
     )  # fmt: skip
 
 

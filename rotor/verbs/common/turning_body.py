@@ -16,7 +16,7 @@ from rotor.checks import did_you_mean
 from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE as MOLECULE_PANEL
-from rotor.requests.field import NUMERICS, all_fields, declared
+from rotor.requests.field import all_fields, declared
 from rotor.requests.fill import Entries, NamedError, naming, read_instance, within, written_fields
 from rotor.requests.lists import Numbers
 from rotor.requests.readers import Custom, Field, Grid, Quantity, Reader, Whole
@@ -136,7 +136,7 @@ class MotionInput:
     )  # fmt: skip
     step: float | None = declared(
         None, InBodyUnits("T", float | str),
-        "With effects: step of a splitting instead, where no torque depends on the angular velocity", "numerics.step", panel=NUMERICS,
+        "With effects: step of a splitting instead, where no torque depends on the angular velocity", "numerics.step",
         example=0.01,
     )  # fmt: skip
     order: int = declared(4, Whole(), "Order of the splitting: 2, 4, 6 or 8", "numerics.order")

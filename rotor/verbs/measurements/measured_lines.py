@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.checks import require_file
 from rotor.frozen import dataclass
-from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, all_fields, declared
+from rotor.requests.field import all_fields, declared
 from rotor.requests.fill import Entries, NamedError, naming, read_instance, within, written_fields
 from rotor.requests.lists import NameList
 from rotor.requests.readers import Custom, Field, InsideError, Names, Quantity, Reader, Text, Whole
@@ -60,7 +60,7 @@ class LinesInput:
     """The measured lines."""
 
     source: Any = declared(
-        None, Custom(file_name), "Lines: .lin, .csv, .cat; or case.par (with case.lin)", "lines.source", option="SOURCE", panel=CONDITIONS,
+        None, Custom(file_name), "Lines: .lin, .csv, .cat; or case.par (with case.lin)", "lines.source", option="SOURCE",
         example="lines.csv",
     )  # fmt: skip
     lin: str | None = declared(
@@ -68,11 +68,10 @@ class LinesInput:
         Text(metavar="FILE"),
         "Lines of case.par, if not case.lin",
         "lines.lin",
-        panel=CONDITIONS,
         example="case.lin",
     )
     merge: str | None = declared(
-        None, Text(metavar="FILE"), "More lines (.lin, .csv, .cat) of the same kind", "lines.merge", panel=CONDITIONS, common=True,
+        None, Text(metavar="FILE"), "More lines (.lin, .csv, .cat) of the same kind", "lines.merge", common=True,
         example="more.csv",
     )  # fmt: skip
 
@@ -83,19 +82,19 @@ class FitInput:
 
     free: tuple[str, ...] | None = declared(
         None, NameList(), 'Constants to fit: A,B,C,DeltaJ; of states and spins "E[1],B[1],G_c[0,1],chi_aa(14N)"; by default those of the '
-        "start that have an error", "parameters.free", panel=OBSERVABLES, common=True, example=["A", "B", "C", "DeltaJ"],
+        "start that have an error", "parameters.free", common=True, example=["A", "B", "C", "DeltaJ"],
     )  # fmt: skip
     ties: tuple[str, ...] = declared(
         (), Names(metavar="TEXT"), 'Constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable', "parameters.ties",
-        option="--tie", panel=OBSERVABLES, common=True, example=["deltaK = 0.5*deltaJ"],
+        option="--tie", common=True, example=["deltaK = 0.5*deltaJ"],
     )  # fmt: skip
     priors: Mapping[str, float] | None = declared(
         None, Priors(), "A-priori standard error of a free constant (MHz); repeatable", "parameters.priors", option="--prior",
-        panel=OBSERVABLES, common=True, example={"DeltaK": "20 kHz"},
+        common=True, example={"DeltaK": "20 kHz"},
     )  # fmt: skip
     reject_above: float | None = declared(
-        None, Quantity(), "Exclude and report lines that deviate by more than this many errors", "numerics.reject_above", option="--reject",
-        panel=NUMERICS, common=True, example=5.0,
+        None, Quantity(), "Exclude and report lines that deviate by more than this many errors", "numerics.reject_above",
+        option="--reject", common=True, example=5.0,
     )  # fmt: skip
     loss: str = declared(
         "squares", Text(metavar="NAME"), "squares; huber or cauchy give outliers less weight", "numerics.loss"
