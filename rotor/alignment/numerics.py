@@ -13,7 +13,7 @@ from rotor.alignment.request import PILOT_TOLERANCE, answer_align, cosine_error
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.inputs import largest_difference
-from rotor.requests.knob import Estimate, Knob, Measure, Sought, with_whole
+from rotor.requests.knob import Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost
 
@@ -85,11 +85,10 @@ def _classical_error(answer: Any, reference: Any) -> float:
 
 
 CLASSICAL = Knob(
-    lambda request: [request.classical_molecules / part for part in (64, 16, 4)],
+    lambda request: [max(request.classical_molecules // part, 2) for part in (64, 16, 4)],
     lambda request: 16 * request.classical_molecules,
     (Measure("cosine of the classical gas", "", _classical_error),),
     "{} other molecules",
-    change=lambda request, name, count: with_whole(request, name, max(count, 2)),
     # the quantum gas beside it does not matter here
     prepare=lambda request: replace(request, tolerance=max(request.tolerance, 1e-2)),
     used=lambda request: request.classical_molecules > 0,

@@ -125,11 +125,6 @@ def with_field(request: Any, name: str, value: Any) -> Any:
     return replace(request, **{name: value})
 
 
-def with_whole(request: Any, name: str, value: float) -> Any:
-    """The request with another whole number."""
-    return replace(request, **{name: int(value)})
-
-
 @dataclass(frozen=True, eq=False)
 class Knob:
     """How fine an approximation is.

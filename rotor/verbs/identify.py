@@ -144,7 +144,7 @@ def show(answer: Identified, report: Report) -> Iterable[Part | None]:
     """The spectrum, the species by evidence and the unidentified lines."""
     identification = answer.identification
     chi = "" if identification.fit is None else f", χ²/ν = {identification.fit.reduced_chi_squared:.3g}"
-    yield spectrum_facts(answer.observed)
+    yield spectrum_facts(report.content["spectrum"])
     yield [
         ("candidates", str(identification.candidates)),
         ("start", f"velocity {identification.velocity_km_s:.2f} km/s, width {identification.fwhm_km_s:.2f} km/s"),

@@ -18,7 +18,7 @@ from rotor.quantum.estimates.accuracy import energies_like, to_order
 from rotor.requests.accuracy import read_accuracy
 from rotor.requests.field import all_fields
 from rotor.requests.fill import Entries
-from rotor.requests.knob import Choice, Knob, Measure, Setting, Sweep, with_whole
+from rotor.requests.knob import Choice, Knob, Measure, Setting, Sweep
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, Run
 from rotor.scenes import accuracy_sweep
@@ -253,7 +253,7 @@ def answer_terms(request: Terms) -> float:
 
 TERMS = Knob(
     (1, 10, 100), 10_000, (Measure("sum", "", lambda answer, reference: abs(answer - reference)),), "{:g} terms",
-    key="numerics.terms", attribute="count", change=with_whole, tried=(1, 10, 100), coarsest=(1, "loosest"),
+    key="numerics.terms", attribute="count", tried=(1, 10, 100), coarsest=(1, "loosest"),
     cost=Growth((1_000, 10_000)),
 )  # fmt: skip
 NUMERICS = Numerics({"": Goal("sum", lambda answer: math.pi**2 / 6 - answer)}, knobs=(TERMS,))

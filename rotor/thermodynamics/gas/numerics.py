@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought, with_whole
+from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 
@@ -165,7 +165,6 @@ def _molecules(**more: Any) -> Knob:
         key="numerics.molecules",
         title="number of molecules",
         attribute="molecules",
-        change=with_whole,
         label="{:.0f}".format,
         tried=_enough_molecules,
         error=_count_error,

@@ -21,7 +21,7 @@ from rotor.quantum.bond_torsion import BondTorsion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
 from rotor.requests.fill import within
-from rotor.requests.knob import Knob, Measure, with_whole
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Custom, Grid, Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.thermodynamics.torsion.hindered_rotor import HinderedRotorFunctions, hindered_rotor_functions
@@ -57,7 +57,7 @@ def _level_error(answer: Any, reference: Any) -> float:
 
 ANGLES = Knob(
     (12, 18, 24, 36, 48, 72), 144, (Measure("levels", "cm-1", _level_error),), "{:g} angles",
-    change=with_whole, used=lambda request: is_scan(request.potential),
+    used=lambda request: is_scan(request.potential),
 )  # fmt: skip
 
 

@@ -61,42 +61,42 @@ class Mapped:
             "pixels": self.pixels,
             "converged": int(self.fit.fitted.sum()),
             "reduced_chi_squared": _quantiles(self.fit.reduced_chi_squared)[1],
-            "maps": self._rows(),
+            "maps": self._maps(),
         }
 
-    def _rows(self) -> list[dict[str, Any]]:
+    def _maps(self) -> list[dict[str, Any]]:
         rows = []
         for name, value, error in zip(self.fit.names, self.fit.values, self.fit.errors, strict=True):
             ends = dict(zip(("low", "median", "high"), _quantiles(value), strict=True))
             rows.append({"name": name, **ends, "determined": int(np.isfinite(error).sum())})
         return rows
 
-    def parts(self) -> Iterable[Part]:
-        """The cube, and the range of each map."""
-        cube = self.cube
-        width, height = cube.noise_k.shape[::-1]
-        first, last = cube.frequency_mhz[0], cube.frequency_mhz[-1]
-        size = f"{width} by {height} pixels, {len(cube.frequency_mhz)} channels from {first:.6f} to {last:.6f} MHz"
-        yield [
-            ("cube", f"{cube.source}: {size}, frame {cube.frame}"),
-            ("noise", f"{float(np.nanmedian(cube.noise_k)):.4g} K a channel, median of the pixels"),
-            ("fitted", f"{self.pixels} pixels, {int(self.fit.fitted.sum())} of them converged"),
-            ("χ²/ν", f"{_quantiles(self.fit.reduced_chi_squared)[1]:.4g}, median"),
-        ]
-        columns = {
-            "parameter": "{name}",
-            "16 %": "{low:.5g}",
-            "median": "{median:.5g}",
-            "84 %": "{high:.5g}",
-            "determined": "{determined}",
-        }
-        yield record_table("pixels of each map", columns, self._rows(), {"parameter"})
-
 
 def _quantiles(values: Any) -> tuple[float | None, ...]:
     """16, 50 and 84 % quantiles of the finite values; None without any."""
     finite = values[np.isfinite(values)]
     return tuple(np.quantile(finite, (0.16, 0.5, 0.84)).tolist()) if len(finite) else (None, None, None)
+
+
+def _map_parts(content: Mapping[str, Any]) -> Iterable[Part]:
+    """The cube, and the range of each map."""
+    cube = content["cube"]
+    (width, height), (first, last) = cube["pixels"], cube["range_mhz"]
+    size = f"{width} by {height} pixels, {cube['channels']} channels from {first:.6f} to {last:.6f} MHz"
+    yield [
+        ("cube", f"{cube['source']}: {size}, frame {cube['frame']}"),
+        ("noise", f"{cube['noise_k']:.4g} K a channel, median of the pixels"),
+        ("fitted", f"{content['pixels']} pixels, {content['converged']} of them converged"),
+        ("χ²/ν", f"{content['reduced_chi_squared']:.4g}, median"),
+    ]
+    columns = {
+        "parameter": "{name}",
+        "16 %": "{low:.5g}",
+        "median": "{median:.5g}",
+        "84 %": "{high:.5g}",
+        "determined": "{determined}",
+    }
+    yield record_table("pixels of each map", columns, content["maps"], {"parameter"})
 
 
 def refuse_corner(request: ObservedRequest, outputs: Mapping[str, Any], _: Any) -> None:
@@ -320,12 +320,12 @@ def draw_corner(answer: Observed, path: Path, report: Report) -> None:
     plot_corner(answer.chain, path, report.command)
 
 
-def show(answer: Observed | Mapped, _: Report) -> Iterable[Part | None]:
+def show(answer: Observed | Mapped, report: Report) -> Iterable[Part | None]:
     """The spectrum and the model, or the fit."""
     if not isinstance(answer, Observed):
-        yield from answer.parts()
+        yield from _map_parts(report.content)
         return
-    yield spectrum_facts(answer.spectrum)
+    yield spectrum_facts(report.content["spectrum"])
     if answer.fit is None:
         yield record_table("model", _MODEL, answer.components, LEFT)
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -171,17 +171,12 @@ def padded(spectrum: ObservedSpectrum, redshift: float = 0.0, km_s: float = 300.
     return first * (1 - factor), last * (1 + factor)
 
 
-def spectrum_facts(spectrum: ObservedSpectrum) -> list[tuple[str, str]]:
-    """The spectrum as rows of a report."""
-    first, last = spectrum.frequency_mhz[0], spectrum.frequency_mhz[-1]
-    rows = [
-        (
-            "spectrum",
-            f"{spectrum.source}: {len(spectrum)} channels from {first:.6f} to {last:.6f} MHz, frame {spectrum.frame}",
-        ),
-        ("noise", f"{float(np.median(spectrum.noise)):.4g} {spectrum.unit} a channel"),
-    ]
-    return rows + [("", text) for text in spectrum.notes]
+def spectrum_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The spectrum as rows of a report, from its record in the JSON."""
+    (first, last), noise = record["range_mhz"], record.get("noise_k", record.get("noise"))
+    channels = f"{record['channels']} channels from {first:.6f} to {last:.6f} MHz, frame {record['frame']}"
+    rows = [("spectrum", f"{record['source']}: {channels}"), ("noise", f"{noise:.4g} {record['unit']} a channel")]
+    return rows + [("", text) for text in record["notes"]]
 
 
 def json_of(spectrum: ObservedSpectrum) -> dict[str, Any]:
