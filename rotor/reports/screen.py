@@ -26,7 +26,7 @@ class Table:
     left: Collection[str] = frozenset()
 
 
-Facts = Sequence[tuple[str, str]]  # names and their texts
+Facts = Sequence[tuple[str, str]]  # names and their texts; those without a text are left out
 Part = str | Facts | Table  # of a report
 
 
@@ -72,6 +72,8 @@ def show_parts(parts: Iterable[Part | None]) -> None:
     """Print the parts of a report that are not empty, with a blank line before each text, and before and after each table."""
     previous: Part | None = None
     for part in parts:
+        if part and not isinstance(part, str | Table):
+            part = [(name, text) for name, text in part if text]
         if not part or (isinstance(part, Table) and not part.rows):
             continue
         if previous is not None and (isinstance(previous, Table) or isinstance(part, str | Table)):

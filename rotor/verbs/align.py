@@ -131,17 +131,14 @@ def _table(answer: AlignAnswer, report: Report) -> Table:
 def _facts(answer: AlignAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     trace, top = answer.trace, answer.trace.top
     acts_on = {pulse.acts_on for pulse in trace.pulses}
-    facts = [("constants", top_facts.constants_text(top))]
-    if "dipole" in acts_on:
-        facts.append(("dipole", top_facts.dipole_text(top)))
-    if "polarizability" in acts_on:
-        facts.append(("polarizability", top_facts.tensor_text(top)))
     accuracy = (
         f"{content['error_estimate']:.1e} estimated: steps {trace.step_error:.1e}, leakage {trace.edge_population:.1e}, "
         f"left out {trace.ensemble.left_out:.1e} of the population"
     )
     return [
-        *facts,
+        ("constants", top_facts.constants_text(top)),
+        ("dipole", top_facts.dipole_text(top) if "dipole" in acts_on else ""),
+        ("polarizability", top_facts.tensor_text(top) if "polarizability" in acts_on else ""),
         ("pulses", "; ".join(_pulse_text(pulse) for pulse in trace.pulses)),
         ("gas", trace.gas_text),
         ("revivals", _revival_text(content["revival_ps"])),
@@ -149,18 +146,14 @@ def _facts(answer: AlignAnswer, content: Mapping[str, Any]) -> list[tuple[str, s
         ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
         ("numerical error", accuracy),
         ("samples", _samples_text(trace)),
-        *_classical_facts(content),
+        ("classical gas", _classical_text(content)),
     ]
 
 
-def _classical_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _classical_text(content: Mapping[str, Any]) -> str:
     """Size of the classical gas and the errors of its means."""
     errors = ", ".join(f"{name} ± {error:.1g}" for name, error in content["classical_errors"].items())
-    return (
-        [("classical gas", f"{content['classical_molecules']} molecules: {errors} at most, of sampling")]
-        if errors
-        else []
-    )
+    return errors and f"{content['classical_molecules']} molecules: {errors} at most, of sampling"
 
 
 def _revival_text(period: float | None) -> str:

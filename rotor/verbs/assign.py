@@ -174,27 +174,16 @@ def _table(number: int, species: AssignedSpecies) -> Table:
 
 def _facts(species: AssignedSpecies) -> list[tuple[str, str]]:
     a, b, c = species.dipole_ratio
-    facts = [
-        (
-            "lines",
-            f"{len(species.lines)} on {len({*species.peak.ravel().tolist()})} peaks, rms {1000 * species.refined.fit.rms_mhz():.1f} kHz",
-        ),
+    peaks, rms = len({*species.peak.ravel().tolist()}), 1000 * species.refined.fit.rms_mhz()
+    twins = (", ".join(f"{n} {x:.3f}" for n, x in zip("ABC", constants, strict=True)) for constants, _ in species.twins)
+    return [
+        ("lines", f"{len(species.lines)} on {peaks} peaks, rms {rms:.1f} kHz"),
         ("types", f"{species.kind}; |μa| : |μb| : |μc| = {a:.2f} : {b:.2f} : {c:.2f}"),
         ("temperature", f"about {species.grown.temperature_k:g} K"),
         ("evidence", f"e^{species.grown.evidence:.0f} against chance"),
+        ("split", "its lines are doublets; their centres are fitted" if species.split else ""),
+        *(("twin", f"as good: {twin} MHz") for twin in twins),
     ]
-    if species.split:
-        facts.append(("split", "its lines are doublets; their centres are fitted"))
-    for constants, _ in species.twins:
-        facts.append(
-            (
-                "twin",
-                "as good: "
-                + ", ".join(f"{name} {value:.3f}" for name, value in zip("ABC", constants, strict=True))
-                + " MHz",
-            )
-        )
-    return facts
 
 
 def results(answer: Any) -> dict[str, Any]:

@@ -235,33 +235,22 @@ def line_record(lines: Catalogue, row: int) -> dict[str, Any]:
 
 def comparison_facts(record: dict[str, Any]) -> list[tuple[str, str]]:
     """Rows of the report on a comparison."""
-    facts = [
+    temperature, unlike, measured = (record[name] for name in ("temperature_k", "degeneracies_that_differ", "measured"))
+    others = counted(record["other_states"], "line")
+    spread = "median |difference| {median:.6g}, largest {largest:.6g}, mean there - here {mean:.6g}"
+    units = {"frequency_mhz": " MHz", "lgint": "", "energy_lower_cm": " cm-1"}
+    agreement = "{lines}: median |obs - calc| {median_mhz:.4g} MHz, {within_3_sigma:.1%} within 3 σ"
+    return [
         ("compared with", record["other"]),
+        ("temperature", "" if temperature is None else f"{temperature:g} K: {record['temperature_source']}"),
         ("matched", str(record["matched"]) + (" (hyperfine components summed)" if record["spins_collapsed"] else "")),
         ("missing there", str(record["missing"])),
         ("only there", str(record["extra"])),
+        ("not compared", f"{others} of states that one side has no number for" if record["other_states"] else ""),
+        *((name, spread.format(**record[name]) + unit) for name, unit in units.items() if record[name]),
+        ("degeneracy", "" if unlike is None else f"differs in {counted(unlike, 'line')}"),
+        ("measured lines", agreement.format(**measured) if measured else ""),
     ]
-    if record["temperature_k"] is not None:
-        facts.insert(1, ("temperature", f"{record['temperature_k']:g} K: {record['temperature_source']}"))
-    if record["other_states"]:
-        facts.append(
-            ("not compared", f"{counted(record['other_states'], 'line')} of states that one side has no number for")
-        )
-    units = {"frequency_mhz": "MHz", "lgint": "", "energy_lower_cm": "cm-1"}
-    for name in DIFFERENCES:
-        if record[name]:
-            text = "median |difference| {median:.6g}, largest {largest:.6g}, mean there - here {mean:.6g}"
-            facts.append((name, f"{text.format(**record[name])} {units[name]}".rstrip()))
-    if record["degeneracies_that_differ"] is not None:
-        facts.append(("degeneracy", f"differs in {counted(record['degeneracies_that_differ'], 'line')}"))
-    if record["measured"]:
-        measured = record["measured"]
-        text = (
-            f"{measured['lines']}: median |obs - calc| {measured['median_mhz']:.4g} MHz, "
-            f"{measured['within_3_sigma']:.1%} within 3 σ"
-        )
-        facts.append(("measured lines", text))
-    return facts
 
 
 @dataclass(frozen=True)

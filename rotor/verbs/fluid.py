@@ -270,7 +270,7 @@ def show(answer: FluidAnswer, report: Report) -> Iterable[Part | None]:
 
 def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, str]]:
     degrees, rms, drift = content["degrees"], content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]
-    drift_error = content["conserved_drift_error_ev_per_ns"]
+    drift_error, density = content["conserved_drift_error_ev_per_ns"], content["density_g_cm3"]
     about = "" if isnan(drift_error) else f" ± {drift_error:.2g}"
     noisy = (
         content["engine"] == "lammps" and settings.ensemble != "nve"
@@ -278,22 +278,17 @@ def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, st
     motions = (
         f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed"
     )
-    facts = [
+    conserved = "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g}{about} eV/ns"
+    box = "" if density is None else " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])
+    return [
         ("model", f"{settings.model}, cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}"),
+        ("box", box and f"{box} Å, {density:.5g} g/cm³"),
         ("start", content["start"]),
         ("degrees", motions),
         ("thermometer", content["thermometer"] + ("" if noisy else ": no error of order h²")),
-        (
-            "conserved",
-            "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g}{about} eV/ns",
-        ),
+        ("conserved", conserved),
+        ("not computed", content["motion_reason"]),
     ]
-    if content["density_g_cm3"] is not None:
-        edges = " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])
-        facts.insert(1, ("box", f"{edges} Å, {content['density_g_cm3']:.5g} g/cm³"))
-    if content["motion_reason"]:
-        facts.append(("not computed", content["motion_reason"]))
-    return facts
 
 
 VERB = Verb(

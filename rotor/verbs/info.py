@@ -25,27 +25,20 @@ EXAMPLES = """\
 
 
 def _facts(answer: InfoAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    top, facts = answer.request.top, list[tuple[str, str]]()
-    if top.symmetry is not None:
-        number = content["symmetry_number"]
-        facts.append(
-            ("point group", f"{content['point_group']}, rotational symmetry number {number}{_near_text(content)}")
-        )
-    if top.constants.representation:
-        heading = "reduction" if top.constants.reduction else "representation"
-        facts.append((heading, top_facts.form_text(top.constants)))
-    dipole = top_facts.dipole_text(top)
-    facts += [
-        ("dipole", dipole),
+    top = answer.request.top
+    group = f"{content['point_group']}, rotational symmetry number {content['symmetry_number']}{_near_text(content)}"
+    heading = "reduction" if top.constants.reduction else "representation"
+    return [
+        ("point group", "" if top.symmetry is None else group),
+        (heading, top_facts.form_text(top.constants) if top.constants.representation else ""),
+        ("dipole", top_facts.dipole_text(top)),
         ("polarizability", top_facts.tensor_text(top)),
         *top_facts.weights_facts(top, content["spin_weights"]),
         *top_facts.states_facts(top),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{round(content['inertial_defect_u_angstrom2'], 9) + 0.0:.6g} u Å²"),
+        ("kind", _kind_text(content["kind"], content["kind_decision"]) if top.kind_of_top else ""),
     ]
-    if top.kind_of_top:
-        facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
-    return facts
 
 
 def _near_text(content: Mapping[str, Any]) -> str:

@@ -164,24 +164,21 @@ def _cut(text: str, width: int) -> str:
 
 
 def _facts(record: dict[str, Any]) -> list[tuple[str, str]]:
-    facts = [
+    group, number = (record[name] or "not known" for name in ("point_group", "symmetry_number"))
+    marks = dict.fromkeys(record["unverified"], "unverified: ")
+    return [
         ("name", ", ".join([record["name"], *record["names"]])),
         ("kind", record["kind"] + (f", κ = {record['kappa']:.4f}" if record["kappa"] is not None else "")),
-        (
-            "point group",
-            f"{record['point_group'] or 'not known'}, symmetry number {record['symmetry_number'] or 'not known'}",
-        ),
+        ("point group", f"{group}, symmetry number {number}"),
         ("file", record["file"]),
+        ("serves", _serves_text(record["serves"]) if record["serves"] else ""),
+        ("level table", record["levels"] and f"{record['levels']} energies, which replace those of the constants"),
+        ("unverified", ", ".join(record["unverified"])),
+        *(
+            (f"{table.replace('_', ' ')} from", marks.get(table, "") + text)
+            for table, text in record["sources"].items()
+        ),
     ]
-    if (serves := record["serves"]) is not None:
-        facts.append(("serves", _serves_text(serves)))
-    if record["levels"]:
-        facts.append(("level table", f"{record['levels']} energies, which replace those of the constants"))
-    if record["unverified"]:
-        facts.append(("unverified", ", ".join(record["unverified"])))
-    marks = dict.fromkeys(record["unverified"], "unverified: ")
-    rows = record["sources"].items()
-    return facts + [(f"{table.replace('_', ' ')} from", marks.get(table, "") + source) for table, source in rows]
 
 
 def _serves_text(serves: dict[str, Any]) -> str:

@@ -102,15 +102,14 @@ def _along(direction: list[float]) -> str:
 
 
 def _facts(answer: StarkAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    top, states = answer.request.top, answer.states
-    facts = [
+    top, states, laser = answer.request.top, answer.states, content["intensity_w_per_cm2"]
+    return [
         ("constants", top_facts.constants_text(top)),
         ("dipole", top_facts.dipole_text(top)),
         field_fact(states, _along(content["field_direction"])),
+        ("laser", f"{laser:g} W/cm² along Z" if laser else ""),
+        accuracy_fact(states),
     ]
-    if content["intensity_w_per_cm2"]:
-        facts.append(("laser", f"{content['intensity_w_per_cm2']:g} W/cm² along Z"))
-    return [*facts, accuracy_fact(states)]
 
 
 VERB = Verb(

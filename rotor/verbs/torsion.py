@@ -54,21 +54,18 @@ def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, 
     wells = [f"{angle:.4g}° ({energy:.4g} cm⁻¹)" for angle, energy in minima]
     quanta = sorted({round(well["harmonic_cm"], 1) for well in record["wells"]})
     harmonic = ", ".join(f"{quantum:g}" for quantum in quanta)
-    facts = [
+    symmetry = f"{count} equal positions in a turn" if count > 1 else "none: no two positions in a turn are equal"
+    misfit = record["scan_misfit_cm"]
+    return [
         ("bond", f"{bond}; {len(answer.rotation.top)} atoms turn"),
         ("potential", f"{record['potential_source']}: {_terms_text(record)}"),
         ("barrier", f"{record['barrier_cm']:.6g} cm⁻¹ from the lowest to the highest point"),
         ("minima", ", ".join(wells) + f"; harmonic {harmonic} cm⁻¹" if wells else "none: a free rotor"),
         ("reduced moment", f"{record['reduced_moment_u_angstrom2']:.6g} u Å²{spread}"),
         ("F", f"{record['f_mhz'] / units.MHZ_PER_CM:.6g} cm⁻¹ ({record['f_mhz']:.6g} MHz)"),
-        (
-            "symmetry",
-            f"{count} equal positions in a turn" if count > 1 else "none: no two positions in a turn are equal",
-        ),
+        ("symmetry", symmetry),
+        ("scan", "" if misfit is None else f"Fourier series within {misfit:.2g} cm⁻¹ (root mean square)"),
     ]
-    if record["scan_misfit_cm"] is not None:
-        facts.append(("scan", f"Fourier series within {record['scan_misfit_cm']:.2g} cm⁻¹ (root mean square)"))
-    return facts
 
 
 def _classical_facts(answer: TorsionAnswer, report: Report) -> list[tuple[str, str]]:

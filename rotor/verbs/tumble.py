@@ -138,35 +138,30 @@ def _driven_parts(answer: DrivenAnswer, content: Mapping[str, Any]) -> list[Part
 
 
 def _facts(answer: TumbleAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    request, facts = answer.request, list[tuple[str, str]]()
-    units = request.units
-    top = getattr(request, "top", None)
-    if top is not None:
-        facts.append(top_facts.rigid_fact(top))
-    if request.named is not None:
-        facts.append(("body", f"{request.named.text}; assumed sizes"))
+    request, units = answer.request, answer.request.units
+    top, ratio = getattr(request, "top", None), content["separatrix_ratio"]
     size = f"{content['angular_momentum_size']:.8g}{_unit(units.angular_momentum)}"
     vector = f"({_numbers(content['angular_momentum'])})"
-    ratio, growth = content["separatrix_ratio"], content["growth_rate"]
     drifts = {"energy": "energy", "|L|": "momentum", "L in space": "space_momentum"}
     conserved = ", ".join(f"{name} to {content['invariant_drift'][key]:.1e}" for name, key in drifts.items())
-    facts += [
+    separatrix = growth = ""
+    if ratio is not None:
+        low, _, high = sorted(zip(request.moments, request.axes, strict=True))
+        separatrix = f"|ω{high[1]}/ω{low[1]}| = {ratio:.8g} where L crosses the plane of these two axes"
+        growth = f"{content['growth_rate']:.8g}{_per(units.time)} off the intermediate axis, exact"
+    return [
+        *([] if top is None else [top_facts.rigid_fact(top)]),
+        ("body", "" if request.named is None else f"{request.named.text}; assumed sizes"),
         ("|L|", f"{size}, {vector} in the body: {request.source}"),
         ("energy", f"{content['energy']:.10g}{_unit(units.energy)}"),
         ("motion", _motion_text(request, content)),
         ("about L", f"turns by {content['turning_rate']:.8g} rad{_per(units.time)} on average, in the space frame"),
-    ]
-    if ratio is not None:
-        low, _, high = sorted(zip(request.moments, request.axes, strict=True))
-        where = f"|ω{high[1]}/ω{low[1]}| = {ratio:.8g} where L crosses the plane of these two axes"
-        facts.append(("separatrix", where))
-        facts.append(("growth rate", f"{growth:.8g}{_per(units.time)} off the intermediate axis, exact"))
-    facts += [
+        ("separatrix", separatrix),
+        ("growth rate", growth),
         ("chaos", content["chaos"]),
         ("times", content["times_source"]),
         ("conserved", f"{conserved} relative: round-off, at all times of the request"),
     ]
-    return facts
 
 
 def _motion_text(request: TumbleRequest, content: Mapping[str, Any]) -> str:

@@ -75,16 +75,15 @@ def _table(answer: ZeemanAnswer, report: Report) -> Table:
 
 
 def _facts(answer: ZeemanAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    facts = [
+    chi = content["magnetisability_abc"]
+    return [
         ("constants", top_facts.constants_text(answer.request.top)),
         ("g", _tensor_text(content["g_abc"])),
         field_fact(answer.states, "along Z"),
+        ("magnetisability", "" if chi is None else f"{_tensor_text(chi)} 1e-6 erg/(G² mol)"),
+        ("g of spins", ", ".join(f"{name} {value:g}" for name, value in (content["nuclear_g"] or {}).items())),
+        accuracy_fact(answer.states),
     ]
-    if content["magnetisability_abc"] is not None:
-        facts.append(("magnetisability", f"{_tensor_text(content['magnetisability_abc'])} 1e-6 erg/(G² mol)"))
-    if content["nuclear_g"]:
-        facts.append(("g of spins", ", ".join(f"{name} {value:g}" for name, value in content["nuclear_g"].items())))
-    return [*facts, accuracy_fact(answer.states)]
 
 
 def _tensor_text(tensor: Tensor) -> str:
