@@ -39,8 +39,10 @@ SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"
 
 def options_of(verb: Verb) -> dict[str, Field]:
     """Every option of a verb, by identity of the input or name of the file; those of a tool are few, and --help shows all."""
-    fields = verb.parameters | {extra.option: extra.field for extra in verb.extras}
-    fields |= {output.name: output.field for output in verb.all_outputs}
+    verbs = (verb,) if verb.other is None else (verb.other, verb)
+    fields = {name: field for each in verbs for name, field in each.options.items()}
+    fields |= {extra.option: extra.field for extra in verb.extras}
+    fields |= {output.name: output.field for each in verbs for output in each.outputs}
     if verb.has_json:
         fields["json"] = Field(FILE, JSON_HELP, name="json", panel=OUTPUT, common=True)
     if verb.has_scenes:

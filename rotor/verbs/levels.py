@@ -59,18 +59,19 @@ def _span(name: str) -> Any:
 def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     top, request = answer.request.top, answer.request
     between = f"= {request.jmin}" if request.jmin == request.jmax else f"from {request.jmin} to {request.jmax}"
-    limits = f"{'N' if 'n' in content['quantum_numbers'] else 'J'} {between}"
-    if request.kmin is not None or request.kmax is not None:
-        limits += f", K from {request.kmin or 0} to {request.jmax if request.kmax is None else request.kmax}"
-    if request.max_energy_mhz is not None:
-        limits += f", up to {request.max_energy_mhz:g} MHz"
+    last_k = request.jmax if request.kmax is None else request.kmax
+    has_k, highest = request.kmin is not None or request.kmax is not None, request.max_energy_mhz
     levels = answer.table.levels
     lowest = levels.energy_mhz == content["ground_mhz"]
     name = ", ".join(" ".join(label.split()) for label in levels.labels(np.flatnonzero(lowest & (levels.weight > 0))))
     ground = f"{headings(levels.quanta_names)} = {name}, {round(content['ground_mhz'], 4) + 0.0:.4f} MHz above the Hamiltonian's zero"
     absent = int((levels.weight[answer.table.rows] == 0).sum())
-    if absent:
-        limits += f"; {absent} of spin weight 0, which do not exist, are not shown"
+    limits = (
+        f"{'N' if 'n' in content['quantum_numbers'] else 'J'} {between}"
+        + (f", K from {request.kmin or 0} to {last_k}" if has_k else "")
+        + ("" if highest is None else f", up to {highest:g} MHz")
+        + (f"; {absent} of spin weight 0, which do not exist, are not shown" if absent else "")
+    )
     return [
         ("constants", top_facts.constants_text(top)),
         *top_facts.weights_facts(top, content["spin_weights"]),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from rotor.verbs.common.subjects import file_name, saved_inputs
 from rotor.verbs.common.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
 
 if TYPE_CHECKING:
-    from rotor.structures.substitution import SubstitutionStructure, Value
+    from rotor.structures.substitution import SubstitutedAtom, SubstitutionStructure, Value
 
 EXAMPLES = """\
   rotor structure ocs.toml
@@ -140,20 +141,16 @@ _WITHOUT = {"isotopologue": "{0.species}", "rms (u Å²)": "{0.rms_u_angstrom2:.
 
 
 def _coordinates_table(structure: SubstitutionStructure) -> Table:
-    rows = []
-    for atom in structure.atoms:
-        columns = (atom.coordinates_angstrom, atom.squares_angstrom2, atom.errors_angstrom, atom.zero_by_symmetry)
-        cells = [_coordinate_text(*numbers) for numbers in zip(*(list(column) for column in columns), strict=True)]
-        rows.append([str(atom.atom), atom.species, *cells, atom.kraitchman.shape])
-    return Table(
-        "rs: coordinates (Å)", ["atom", "from", "a", "b", "c", "equations"], rows, frozenset({"from", "equations"})
-    )
+    axes: dict[str, Any] = {axis: partial(_coordinate_text, number) for number, axis in enumerate("abc")}
+    columns = {"atom": "{0.atom}", "from": "{0.species}", **axes, "equations": "{0.kraitchman.shape}"}
+    return record_table("rs: coordinates (Å)", columns, structure.atoms, {"from", "equations"})
 
 
-def _coordinate_text(value: float, square: float, error: float, zero_by_symmetry: bool) -> str:
+def _coordinate_text(axis: int, atom: SubstitutedAtom) -> str:
     """A coordinate with its error in the last digits; i·|r| if it is imaginary, 0 if symmetry requires it."""
-    if zero_by_symmetry:
+    if atom.zero_by_symmetry[axis]:
         return "0"
+    square, value, error = atom.squares_angstrom2[axis], atom.coordinates_angstrom[axis], atom.errors_angstrom[axis]
     return f"i·{math.sqrt(-square):.4f}" if square < 0 else f"{value:.5f}({round(error * 1e5)})"
 
 

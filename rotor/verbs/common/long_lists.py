@@ -61,22 +61,21 @@ class LongAnswer(SpectrumAnswer):
 
 def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> bool:
     """Whether a list is made on disk: it may exceed memory, and no output needs it there."""
-    plain = request.shape == "sticks" and request.layer is None and resolution is None and not request.untrusted
-    if (
-        not plain
+    top = request.top
+    in_memory = (
+        request.shape != "sticks"
+        or request.layer is not None
+        or resolution is not None
+        or request.untrusted
         or request.covariance is not None
         or request.vibrations is not None
         or not files.keys() & STREAMED
         or files.keys() - STREAMED - SMALL
-    ):
-        return False
-    if (
-        request.top.internal_rotation is not None and spin_functions(request.top, request.effects) > 1
-    ):  # spins beside rotors have no ranges of F
-        return False
-    if any(path.suffix == ".gz" for path in _streamed(files)) or request.top.dipole_abc_debye is None:
-        return False
-    return _count(request) > _most_lines(files)
+        or (top.internal_rotation is not None and spin_functions(top, request.effects) > 1)  # they have no ranges of F
+        or any(path.suffix == ".gz" for path in _streamed(files))
+        or top.dipole_abc_debye is None
+    )
+    return not in_memory and _count(request) > _most_lines(files)
 
 
 def _most_lines(files: Mapping[str, Any]) -> int:

@@ -255,18 +255,6 @@ class Verb:
         inputs = {**self.subject.options, **all_fields(self.request), **all_fields(self.shown)}
         return {name: item for name, item in inputs.items() if item.flag and not item.hidden}
 
-    @cached_property
-    def parameters(self) -> dict[str, Field]:
-        """The options of this verb and of `other`."""
-        return self.options if self.other is None else {**self.other.options, **self.options}
-
-    @cached_property
-    def all_outputs(self) -> tuple[Output, ...]:
-        """The files of this verb and of `other`."""
-        names = {output.name for output in self.outputs}
-        others = () if self.other is None else self.other.outputs
-        return (*self.outputs, *(output for output in others if output.name not in names))
-
     def verb_for(self, typed: Collection[str]) -> Verb:
         """This verb, or `other` if one of its options is typed (by identity).
 
@@ -275,7 +263,7 @@ class Verb:
         other = self.other
         if other is None:
             return self
-        names = {output.name for output in self.all_outputs} - {output.name for output in self.outputs}
+        names = {output.name for output in other.outputs} - {output.name for output in self.outputs}
         alone = names | (other.options.keys() - self.options.keys()) | (set() if self.workers else {"workers"})
         if alone.isdisjoint(typed):
             return self
