@@ -152,9 +152,8 @@ def write_table(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     if isinstance(answer, LongAnswer):
         answer.write(path, tag_of(answer, report.shown))
         return
-    shown, numbers = report.shown, {}
-    if shown.hitran_id is not None:
-        numbers = dict(zip(("molecule", "isotopologue"), shown.hitran_id, strict=True))
+    shown = report.shown
+    numbers = dict(zip(("molecule", "isotopologue"), shown.hitran_id or (), strict=False))
     write(answer.lines, path, settings={**report.provenance, "tag": tag_of(answer, shown), **numbers})
 
 
@@ -172,10 +171,7 @@ def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
 
 def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Draw the lines or their profile."""
-    if report.shown.over is not None:
-        draw_over(answer, path, report)
-    else:
-        draw_answer(answer, path, report)
+    (draw_answer if report.shown.over is None else draw_over)(answer, path, report)
 
 
 def _lines_part(answer: SpectrumAnswer, report: Report) -> Part:

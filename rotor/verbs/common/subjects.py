@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INT_FILE_IN_SCENE = (
     "--save-scene: a scene cannot hold an .int file; the file and its .var already state the calculation"
 )
-FILES = ("source", "hessian")  # inputs of a molecule that may name a file
+FILES = ("molecule.source", "molecule.hessian")  # inputs that may name a file
 MOLECULE = Field(
     Custom(str, scene_type=str | MoleculeInput), "a name, a file, SMILES:..., or a table", "molecule", default=REQUIRED,
 )  # fmt: skip
@@ -108,14 +108,8 @@ def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:
         )
     if molecule.source is not None and molecule.source.endswith(".int"):
         raise ValueError(INT_FILE_IN_SCENE)
-    content = written_fields(molecule)
-    for name in FILES:
-        key = f"molecule.{name}"
-        if key in content:
-            content[key] = beside(content[key], folder)
-    if list(content) == ["molecule.source"]:
-        return {"molecule": content["molecule.source"]}
-    return content
+    content = {key: beside(v, folder) if key in FILES else v for key, v in written_fields(molecule).items()}
+    return {"molecule": content["molecule.source"]} if list(content) == ["molecule.source"] else content
 
 
 def beside(name: str, folder: Path) -> str:

@@ -126,13 +126,15 @@ def species_of(
         return [_species_of_word(word, range_mhz, partition, note) for word in words]
     from rotor.formats.catalogue.database import LineCatalogue
 
-    out = []
+    species: list[SpeciesLines] = []
     with LineCatalogue(catalogue) as opened:
         for word in words:
-            if is_catalogue(word):
-                out.append(_species_of_word(word, range_mhz, partition, note))
-                continue
-            matches = opened.species_between(*range_mhz, [word])
+            in_file = is_catalogue(word)
+            matches = (
+                [_species_of_word(word, range_mhz, partition, note)]
+                if in_file
+                else opened.species_between(*range_mhz, [word])
+            )
             if len(matches) != 1:
                 listed = ", ".join(
                     f"{match.identity.get('tag', '')} {match.name} ({match.identity.get('database', '')})"
@@ -141,8 +143,8 @@ def species_of(
                 raise ValueError(
                     f"{word}: {len(matches)} species of {catalogue} with lines in the range: {listed}; name one by its tag or full name"
                 )
-            out += matches
-    return out
+            species += matches
+    return species
 
 
 def is_catalogue(source: Any) -> bool:
