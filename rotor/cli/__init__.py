@@ -22,7 +22,6 @@ import typer
 
 from rotor.checks import NoAnswerError, RunStopped, require_file
 from rotor.cli import process
-from rotor.cli.process import release_files
 from rotor.verbs import declared_verbs, has_small_blocks
 
 if TYPE_CHECKING:
@@ -217,7 +216,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         return _fail(*_failure(error, arguments), arguments)
     finally:
-        release_files()
+        process.HELD.close()
 
 
 def _failure(error: Exception, arguments: list[str]) -> tuple[int, str]:

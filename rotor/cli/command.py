@@ -21,7 +21,7 @@ import typer.core
 
 from rotor.checks import NoAnswerError
 from rotor.cli import process
-from rotor.cli.process import HELD, at_end
+from rotor.cli.process import HELD
 from rotor.cli.shared_options import MOST_WORKERS, PLOT_NAMES, picture_fields, picture_settings, picture_style
 from rotor.reports.screen import show_parts
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, panel_of
@@ -203,7 +203,7 @@ def run_verb(
         refuse_overwriting(files, inputs)
     view = picture_settings(verb, places, "plot" in files.paths)
     outputs = {**files.paths, **dict.fromkeys(files.on_screen, ())}
-    work = Work(None, shown, outputs, note, True, {"command": str(context.obj)}, view, at_end)
+    work = Work(None, shown, outputs, note, True, {"command": str(context.obj)}, view, HELD.callback)
     _carry_out(Calculation(verb, entries, work), files, places)
 
 

@@ -28,11 +28,18 @@ class NewRequest:
 
 def answer(request: NewRequest, _: Any) -> str:
     """The scene, or the schema."""
+    from json import dumps
+
+    from rotor.scenes.schema import json_schema
     from rotor.scenes.template import template
 
     if (request.kind is None) != request.schema:
         raise ValueError(f"expected either a kind of scene, one of {', '.join(SCENE_VERBS)}, or --schema")
-    return _schema() if request.kind is None else template(request.kind)
+    return (
+        template(request.kind)
+        if request.kind is not None
+        else f"{dumps(json_schema(), indent=1, ensure_ascii=False)}\n"
+    )
 
 
 def check(_: NewRequest, outputs: Mapping[str, Any], __: Any) -> None:
@@ -40,14 +47,6 @@ def check(_: NewRequest, outputs: Mapping[str, Any], __: Any) -> None:
     for path in outputs.get("out", ()):
         if path.exists():
             raise ValueError(f"--out {path}: exists already; remove it, or give another name")
-
-
-def _schema() -> str:
-    import json
-
-    from rotor.scenes.schema import json_schema
-
-    return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 VERB = Tool(

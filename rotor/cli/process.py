@@ -7,11 +7,10 @@ import gc
 import os
 import sys
 import threading
-from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from typing import NoReturn
 
-HELD = ExitStack()  # locks of the files that the command will write
+HELD = ExitStack()  # what is released at the end of the command: locks of the files that it will write, a session
 _OWN = False  # set by the console script
 _ALLOCATIONS = 50_000  # objects between two searches for cycles; Python's 700 take 5 to 15 % of a prediction
 
@@ -77,13 +76,3 @@ def one_thread_of_blas(jmax: int | None = None) -> None:
     """
     if _OWN and "numpy" not in sys.modules and (jmax is None or jmax <= _ONE_THREAD_TO):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-def release_files() -> None:
-    """Release the locks of the files at the end of a command."""
-    HELD.close()
-
-
-def at_end(done: Callable[[], object]) -> None:
-    """Call a function at the end of the command."""
-    HELD.callback(done)

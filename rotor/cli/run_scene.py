@@ -193,9 +193,9 @@ def _workers(options: Options) -> AbstractContextManager[Executor | None]:
         return _dask_pool(options.dask, options.dask_tls)
     if options.workers in (None, 1):
         return nullcontext()
-    from rotor.scenes.worker_processes import worker_processes
+    from rotor.scenes.worker_processes import WorkerProcesses
 
-    return worker_processes(options.workers)
+    return WorkerProcesses(options.workers)
 
 
 @contextmanager

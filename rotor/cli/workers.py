@@ -14,10 +14,10 @@ from rotor.reports.progress import progress_bar
 @contextmanager
 def working(workers: int, what: str) -> Iterator[Executor | None]:
     """An executor with a bar on standard error; None for one worker without a terminal."""
-    from rotor.scenes.worker_processes import worker_processes
+    from rotor.scenes.worker_processes import WorkerProcesses
 
     with ExitStack() as stack:
-        pool = None if workers == 1 else stack.enter_context(worker_processes(workers))
+        pool = None if workers == 1 else stack.enter_context(WorkerProcesses(workers))
         advance = stack.enter_context(progress_bar(what)) if sys.stderr.isatty() else None
         yield Counted(pool, advance) if pool or advance else None
 

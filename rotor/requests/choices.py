@@ -9,7 +9,7 @@ from typing import Any
 from rotor.frozen import dataclass
 from rotor.requests.field import REQUIRED, all_fields, undeclared
 from rotor.requests.fill import Entries, equal, read_instance, written_fields
-from rotor.requests.readers import Field, InsideError, Reader
+from rotor.requests.readers import InsideError, Reader
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,8 @@ class Choices(Reader):
             if key not in fields:
                 raise ValueError(f"{line!r}: {name} has no {key!r}; {nearest(key, fields)}")
         if missing := [key for key, field in fields.items() if field.default is REQUIRED and key not in texts]:
-            raise ValueError(f"{line!r}: {missing[0]} is missing; give {_usage(fields)}")
+            usage = ", ".join(f"{key} ({field.help})" for key, field in fields.items())
+            raise ValueError(f"{line!r}: {missing[0]} is missing; give {usage}")
         values = {}
         for key, text in texts.items():
             try:
@@ -116,11 +117,6 @@ def _words(line: str) -> tuple[str, dict[str, str]]:
         else:
             name.append(word)
     return " ".join(name), texts
-
-
-def _usage(fields: Mapping[str, Field]) -> str:
-    """All parameters with their help texts."""
-    return ", ".join(f"{key} ({field.help})" for key, field in fields.items())
 
 
 def nearest(word: str, names: Iterable[str]) -> str:

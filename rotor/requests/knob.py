@@ -120,11 +120,6 @@ class Prediction:
     runs: float
 
 
-def with_field(request: Any, name: str, value: Any) -> Any:
-    """The request with another value of a field."""
-    return replace(request, **{name: value})
-
-
 @dataclass(frozen=True, eq=False)
 class Knob:
     """How fine an approximation is.
@@ -157,7 +152,7 @@ class Knob:
     key: str = ""
     title: str = ""
     attribute: str = ""
-    change: Callable[[Any, str, Any], Any] = with_field
+    change: Callable[[Any, str, Any], Any] = lambda request, name, value: replace(request, **{name: value})
     value: Callable[[Any], Any] | None = None
     used: Callable[[Any], bool] = lambda request: True
     fixed: str | Callable[[Any], str | None] | None = None

@@ -54,7 +54,7 @@ class WorkerKilledError(RuntimeError):
 
 
 class WorkerProcesses(Executor):
-    """An executor of processes that do not depend on each other."""
+    """An executor of processes that do not depend on each other, until the end of its context; an error or Ctrl-C ends them at once."""
 
     def __init__(self, number: int) -> None:
         """Start `number` processes."""
@@ -89,6 +89,9 @@ class WorkerProcesses(Executor):
         for pool in tuple(self._pools):
             pool.shutdown(wait, cancel_futures=cancel_futures)
 
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        (self.shutdown if kind is None else self.terminate)()
+
     def terminate(self) -> None:
         """End the processes at once; their current pieces are lost."""
         self._ended = True
@@ -97,18 +100,6 @@ class WorkerProcesses(Executor):
             for process in (getattr(pool, "_processes", None) or {}).values():  # public from Python 3.14 on
                 process.terminate()
         self.shutdown()
-
-
-@contextmanager
-def worker_processes(number: int) -> Iterator[WorkerProcesses]:
-    """`number` processes until the end of the context; an error or Ctrl-C ends them at once."""
-    pool = WorkerProcesses(number)
-    try:
-        yield pool
-    except BaseException:
-        pool.terminate()
-        raise
-    pool.shutdown()
 
 
 def start_ahead(scene_text: str = "") -> None:

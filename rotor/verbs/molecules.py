@@ -7,17 +7,13 @@ from dataclasses import replace
 from functools import cache
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, plain
 from rotor.requests.field import declared
 from rotor.requests.readers import Text
 from rotor.verbs.common.verb import Tool, Work
-
-if TYPE_CHECKING:
-    from rotor.formats.molecules.molecule_file import MoleculeFile
-    from rotor.tops.top import Top
 
 WIDEST_NAME = 24
 
@@ -88,8 +84,10 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
         from rotor.formats.read_write import file_top
 
         top = file_top(file)
-    else:
-        top = _top_of_constants(file)
+    else:  # without its geometry: finding the symmetry would take most of the time
+        from rotor.tops.top import Top
+
+        top = replace(Top.from_constants(file.constants), dipole_abc_debye=file.dipole_abc_debye)
     return {
         "name": file.name,
         "names": list(file.names),
@@ -111,14 +109,6 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
         "file": str(path),
         "own": _is_own(path.parent),
     }
-
-
-def _top_of_constants(file: MoleculeFile) -> Top:
-    """The top without its geometry: finding the symmetry would take most of the time."""
-    from rotor.tops.top import Top
-
-    assert file.constants is not None
-    return replace(Top.from_constants(file.constants), dipole_abc_debye=file.dipole_abc_debye)
 
 
 @cache

@@ -24,7 +24,7 @@ from rotor.scenes.scene import Scene, make_scene, parse_scene, write_scene
 from rotor.scenes.sweep import points, run_sweep
 from rotor.scenes.sweep.combined import CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
-from rotor.scenes.worker_processes import WorkerKilledError, worker_processes
+from rotor.scenes.worker_processes import WorkerKilledError, WorkerProcesses
 from rotor.table import Table
 from rotor.temporary import locked_file
 
@@ -200,7 +200,7 @@ def _threads_of_blas(_):
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_a_killed_worker_costs_its_piece(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
-    with worker_processes(2) as pool:
+    with WorkerProcesses(2) as pool:
         killed = [pool.submit(_end_this_process, 0) for _ in range(3)]
         others = [pool.submit(_double, n) for n in range(20)]
         assert [future.result() for future in others] == [2 * n for n in range(20)]
@@ -225,7 +225,7 @@ def test_a_sweep_goes_on_where_a_worker_is_killed(folder, monkeypatch):
         def submit(self, function, job):
             return self.pool.submit(_end_this_process if job.point.values["observables.jmax"] == 3 else function, job)
 
-    with worker_processes(2) as pool:
+    with WorkerProcesses(2) as pool:
         result = run_sweep(scene, record="r", executor=Deadly(pool))
         assert [record["values"] for record in result.failed] == [{"observables.jmax": 3}]
         assert "ended from outside" in result.failed[0]["error"]
@@ -235,7 +235,7 @@ def test_a_sweep_goes_on_where_a_worker_is_killed(folder, monkeypatch):
 
 
 def _interrupted():
-    with worker_processes(1) as pool:
+    with WorkerProcesses(1) as pool:
         pool.submit(_double, 1).result()
         pool.submit(time.sleep, 60)
         raise KeyboardInterrupt
@@ -477,14 +477,14 @@ def test_parquet_of_all_points_stays_in_the_folder(call, folder):
 
 ORPHANS = """
 import os, sys, time
-from rotor.scenes.worker_processes import worker_processes
+from rotor.scenes.worker_processes import WorkerProcesses
 
 def number(_):
     time.sleep(0.2)
     return os.getpid()
 
 if __name__ == "__main__":
-    with worker_processes(2) as pool:
+    with WorkerProcesses(2) as pool:
         print(*{future.result() for future in [pool.submit(number, n) for n in range(4)]}, flush=True)
         time.sleep(60)
 """
@@ -526,18 +526,18 @@ def _is_loaded(name: str) -> bool:
 def test_workers_have_one_thread_of_blas(name, monkeypatch):
     """Processes with several threads each wait for one another, whatever this process has."""
     monkeypatch.setenv(name, "4")
-    with worker_processes(1) as pool:
+    with WorkerProcesses(1) as pool:
         assert pool.submit(_setting, name).result() == "1"
     assert os.environ[name] == "4"
 
 
 def test_workers_have_the_environment_of_now_and_the_modules_of_the_work(monkeypatch):
-    with worker_processes(1) as pool:
+    with WorkerProcesses(1) as pool:
         assert pool.submit(_setting, "ROTOR_MOLECULES").result() == os.environ.get("ROTOR_MOLECULES")
         if sys.platform == "linux":
             assert pool.submit(_is_loaded, "rotor.scenes.sweep.run").result()
     monkeypatch.setenv("ROTOR_MOLECULES", "elsewhere")
-    with worker_processes(1) as pool:
+    with WorkerProcesses(1) as pool:
         assert pool.submit(_setting, "ROTOR_MOLECULES").result() == "elsewhere"
 
 
@@ -551,8 +551,8 @@ if __name__ == "__main__":
     from rotor.__main__ import start_workers_ahead
     start_workers_ahead(["run", "s.toml", "--workers", "2"])
     heavy = bool({"numpy", "typer"} & set(sys.modules))
-    from rotor.scenes.worker_processes import worker_processes
-    with worker_processes(2) as pool:
+    from rotor.scenes.worker_processes import WorkerProcesses
+    with WorkerProcesses(2) as pool:
         print(heavy, pool.submit(loaded, 0).result())
 """
 
@@ -576,14 +576,14 @@ def loaded_by(job):
     return record.get("error"), sorted(name for name in set(sys.modules) - before if name.startswith(("rotor", "rdkit")))
 
 if __name__ == "__main__":
-    from rotor.scenes.worker_processes import start_ahead, worker_processes
+    from rotor.scenes.worker_processes import WorkerProcesses, start_ahead
     start_ahead(open("s.toml").read())
     from rotor.scenes.scene import read_scene
     from rotor.scenes.sweep.points import points
     from rotor.scenes.sweep.run import Job
     (point,) = points(read_scene("s.toml"))
     os.mkdir("all.parquet.points")
-    with worker_processes(1) as pool:
+    with WorkerProcesses(1) as pool:
         print(pool.submit(loaded_by, Job("k" * 64, point, ".", ".", ("all.parquet",))).result())
 """
 
@@ -656,7 +656,7 @@ def test_workers_search_for_cycles_as_seldom_as_the_process_that_began():
     before = gc.get_threshold()
     gc.set_threshold(43_210, 7, 5)
     try:
-        with worker_processes(1) as pool:
+        with WorkerProcesses(1) as pool:
             assert pool.submit(gc.get_threshold).result() == (43_210, 7, 5)
     finally:
         gc.set_threshold(*before)
