@@ -183,11 +183,11 @@ def form_text(constants: Constants) -> str:
     return f"{reduction}{constants.representation}"
 
 
-def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "μb", "μc")) -> str:
+def vector_text(vector: Sequence[float] | None) -> str:
     """A dipole as `μa 0, μb 1.8546, μc 0 D`."""
     if vector is None:
         return "not known"
-    return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(names, vector, strict=True)) + " D"
+    return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(("μa", "μb", "μc"), vector, strict=True)) + " D"
 
 
 def dipole_text(top: Top) -> str:

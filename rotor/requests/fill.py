@@ -61,7 +61,7 @@ def _make(part: Part, entries: Entries, subject: Any) -> Any:
         return part.make(part.inputs(**inner), subject)
 
 
-def read_instance(structure: Any, entries: Entries, subject: Any = None) -> Any:
+def read_instance(structure: Any, entries: Entries) -> Any:
     """Instance of a dataclass all of whose fields are declared."""
     missing = [
         field for field in declared_fields(structure).values() if field.default is REQUIRED and not entries.has(field)
@@ -71,7 +71,7 @@ def read_instance(structure: Any, entries: Entries, subject: Any = None) -> Any:
         texts = f"the key {name!r} is missing", f"{name} is missing; --help shows what the command takes"
         raise ValueError(texts[entries.style == "option"])
     with naming(all_fields(structure).values(), entries.style):
-        return structure(**read_fields(structure, entries, subject))
+        return structure(**read_fields(structure, entries))
 
 
 def refuse_misfits(fields: Collection[Field], given: Collection[str], style: str) -> None:

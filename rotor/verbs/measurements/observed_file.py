@@ -166,9 +166,9 @@ def _species_of_word(word: str, range_mhz: tuple[float, float], partition: str |
     return species_from_lines(lines, top.name or word)
 
 
-def padded(spectrum: ObservedSpectrum, redshift: float = 0.0, km_s: float = 300.0) -> tuple[float, float]:
-    """Range of rest frequencies (MHz) whose lines may fall into a spectrum: widened by velocities up to `km_s`."""
-    factor = km_s / 299792.458
+def padded(spectrum: ObservedSpectrum, redshift: float = 0.0) -> tuple[float, float]:
+    """Range of rest frequencies (MHz) whose lines may fall into a spectrum: widened by velocities up to 300 km/s."""
+    factor = 300.0 / 299792.458
     first, last = (float(spectrum.frequency_mhz[i]) * (1 + redshift) for i in (0, -1))
     return first * (1 - factor), last * (1 + factor)
 
