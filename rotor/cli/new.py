@@ -58,12 +58,7 @@ VERB = Tool(
     text=None,
     show=lambda answer, report: () if report.content["files"] else (answer.removesuffix("\n"),),
     outputs=(
-        Output(
-            "out",
-            (".toml", ".json"),
-            "Write to a file",
-            lambda answer, path, report: write_text(path, answer),
-        ),
+        Output("out", (".toml", ".json"), "Write to a file", lambda answer, path, report: write_text(path, answer)),
     ),
     check=check,
 )

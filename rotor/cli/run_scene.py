@@ -62,10 +62,7 @@ class Options(SceneFile):
         rule=Rule(excludes=("dask",), why="the cluster has its own workers"),
     )
     dask: str | None = declared(
-        None,
-        Text(metavar="ADDRESS"),
-        "Use the workers of a Dask scheduler instead: tcp://head:8786",
-        panel=NUMERICS,
+        None, Text(metavar="ADDRESS"), "Use the workers of a Dask scheduler instead: tcp://head:8786", panel=NUMERICS
     )
     dask_tls: str | None = declared(
         None,

@@ -187,7 +187,9 @@ def vector_text(vector: Sequence[float] | None) -> str:
     """A dipole as `μa 0, μb 1.8546, μc 0 D`."""
     if vector is None:
         return "not known"
-    return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(("μa", "μb", "μc"), vector, strict=True)) + " D"
+    return (
+        ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(("μa", "μb", "μc"), vector, strict=True)) + " D"
+    )
 
 
 def dipole_text(top: Top) -> str:

@@ -18,12 +18,7 @@ Where = str | os.PathLike[str]
 
 
 def run_scene(
-    scene: Scene,
-    *,
-    folder: Where = ".",
-    out: Where = ".",
-    executor: Executor | None = None,
-    note: Note = silent,
+    scene: Scene, *, folder: Where = ".", out: Where = ".", executor: Executor | None = None, note: Note = silent
 ) -> Outcome:
     """Run one scene.
 

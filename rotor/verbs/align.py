@@ -31,10 +31,7 @@ _TEXTS = {
         "gaussian",
         'Gaussian pulse: peak intensity, full width at half maximum[, time]: "1e13 W/cm2, 1 ps"; repeatable',
     ),
-    "--switched": (
-        "switched",
-        'Switched pulse: "1e12 W/cm2, RISE, PLATEAU, FALL[, START]" (ps); repeatable',
-    ),
+    "--switched": ("switched", 'Switched pulse: "1e12 W/cm2, RISE, PLATEAU, FALL[, START]" (ps); repeatable'),
     "--kick": ("kick", 'Kick without duration: "0.5 J/cm2[, TIME]"; repeatable'),
     "--thz": (
         "thz",
@@ -212,10 +209,7 @@ VERB = Verb(
     results=results,
     rows="trace",
     show=top_facts.report_on_top(_facts, _table, sources=("constants", "dipole", "polarizability")),
-    outputs=(
-        *tables("the cosines", "out"),
-        picture("Draw the cosines", "out.png"),
-    ),
+    outputs=(*tables("the cosines", "out"), picture("Draw the cosines", "out.png")),
     subject=OneMolecule(("dipole", *REFINEMENT, *NUCLEI, *STATES), prepare),
     drawn="ps",
     scaled=False,

@@ -162,11 +162,7 @@ class FluidShown(Shown):
     """Intervals of the growing files, and whether a run resumes."""
 
     frames_every: int | None = declared(
-        None,
-        Whole(1),
-        "Steps between frames; by default those between rows",
-        "outputs.frames_every",
-        example=100,
+        None, Whole(1), "Steps between frames; by default those between rows", "outputs.frames_every", example=100
     )
     checkpoint_every: int = declared(1000, Whole(1), "Steps between checkpoints", "outputs.checkpoint_every")
     resume: bool = declared(False, Flag(), "Continue from the checkpoint", panel=OUTPUT)

@@ -103,10 +103,7 @@ VERB = Verb(
         _curves_table,
         title=lambda answer: f"{top_facts.heading(answer.request.top)}, a classical gas",
     ),
-    outputs=(
-        *tables("the correlation functions", "out"),
-        picture("Draw the test and the functions", "out.png"),
-    ),
+    outputs=(*tables("the correlation functions", "out"), picture("Draw the test and the functions", "out.png")),
     subject=OneMolecule((*POLARIZABILITY, "spin_weights", *NUCLEI, *STATES, *REFINEMENT, "symmetry_tolerance")),
     stated=("source", "temperature_k", "molecules", "seed", "vector_source", "tensor_source"),
     drawn="ps",

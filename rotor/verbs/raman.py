@@ -85,10 +85,7 @@ VERB = Verb(
     results=results,
     rows="lines",
     show=top_facts.report_on_top(_facts, _table, sources=("constants", "polarizability", "spin weights")),
-    outputs=(
-        *tables("all lines", "lines"),
-        picture("Draw the lines", "lines.png"),
-    ),
+    outputs=(*tables("all lines", "lines"), picture("Draw the lines", "lines.png")),
     subject=OneMolecule(
         (*DIPOLE, "anisotropy", "state_dipoles", *REFINEMENT),
         lambda top, reading, entries: with_known_polarizability(top, reading),

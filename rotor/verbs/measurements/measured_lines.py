@@ -64,11 +64,7 @@ class LinesInput:
         example="lines.csv",
     )  # fmt: skip
     lin: str | None = declared(
-        None,
-        Text(metavar="FILE"),
-        "Lines of case.par, if not case.lin",
-        "lines.lin",
-        example="case.lin",
+        None, Text(metavar="FILE"), "Lines of case.par, if not case.lin", "lines.lin", example="case.lin"
     )
     merge: str | None = declared(
         None, Text(metavar="FILE"), "More lines (.lin, .csv, .cat) of the same kind", "lines.merge", common=True,
