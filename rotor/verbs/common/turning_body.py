@@ -70,7 +70,7 @@ class InBodyUnits(Reader):
     """Numbers in the body's units. Text is read once the body is known."""
 
     metavar: str
-    scene_type: Any = list[float]
+    scene_type: Any = list[float] | str
 
     def write(self, value: Any) -> Any:
         """Text and a single number unchanged, several numbers as a list."""
@@ -123,7 +123,7 @@ class MotionInput:
         "conditions.angular_momentum", common=True, example=[10.0, 0.1, 0.1],
     )  # fmt: skip
     times: Any = declared(
-        None, InBodyUnits("GRID", list[float] | str), "Times (ps for a molecule, s with SI units); by default two periods",
+        None, InBodyUnits("GRID"), "Times (ps for a molecule, s with SI units); by default two periods",
         "conditions.times", common=True, example="0:2:201",
     )  # fmt: skip
     effects: tuple[Any, ...] = declared(
