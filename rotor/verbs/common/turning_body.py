@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from difflib import get_close_matches
 from numbers import Real
@@ -43,7 +44,7 @@ def _moments(raw: Any) -> Three:
     from rotor.classical.euler import checked_moments
 
     moments = three(raw, "kg*m2" if in_si(raw) else "")
-    with within(repr(raw)):
+    with within(repr(raw)) if isinstance(raw, str) else nullcontext():
         checked_moments(moments)
     return moments
 
