@@ -323,6 +323,9 @@ def option_rows() -> list[str]:
     rows.append(
         "| XOPT: PHASE 1 to 7, or odd operators within a state, beside l-doubled states | no: they have phases of their own |"
     )
+    rows.append(
+        "| XOPT: the same, with a magnetic moment (SYM 0) of TYP 8 or 12 | no: a half turn changes it; moments of all other TYP compute |"
+    )
     rows.append("| DIAG 0 to 5: the names of levels | yes |")
     rows.append(
         "| DIAG below 0: diagonal elements in place of eigenvalues | yes, with a note, fits too; refused for "

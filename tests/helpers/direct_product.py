@@ -16,14 +16,14 @@ def states_up_to(top: int) -> list[tuple[int, int, int]]:
 
 
 @cache
-def cosines(top: int) -> dict[tuple[int, str], np.ndarray]:
-    """φ_pi for p = -1, 0, 1 (spherical, space) and i = a, b, c on |N k m⟩, z = a."""
+def cosines(top: int, z: str = "a") -> dict[tuple[int, str], np.ndarray]:
+    """φ_pi for p = -1, 0, 1 (spherical, space) and i = a, b, c on |N k m⟩, k along z."""
     states = states_up_to(top)
     index = {s: i for i, s in enumerate(states)}
     results = {}
     for p, axis in product((-1, 0, 1), "abc"):
-        x, y, z = in_frame(np.eye(3)["abc".index(axis)], "a")
-        parts = {0: z, 1: -(x + 1j * y) / np.sqrt(2), -1: (x - 1j * y) / np.sqrt(2)}
+        x, y, along = in_frame(np.eye(3)["abc".index(axis)], z)
+        parts = {0: along, 1: -(x + 1j * y) / np.sqrt(2), -1: (x - 1j * y) / np.sqrt(2)}
         matrix = np.zeros((len(states),) * 2, complex)
         for (n, k, m), q, other in product(states, (-1, 0, 1), range(top + 1)):
             if (other, k + q, m + p) in index and parts[q]:
@@ -35,9 +35,10 @@ def cosines(top: int) -> dict[tuple[int, str], np.ndarray]:
     return results
 
 
-def space_cosines(top: int) -> dict[tuple[str, str], np.ndarray]:
+@cache
+def space_cosines(top: int, z: str = "a") -> dict[tuple[str, str], np.ndarray]:
     """φ_FI, F = X, Y, Z in space, I = a, b, c in the molecule."""
-    phi = cosines(top)
+    phi = cosines(top, z)
     results = {}
     for axis in "abc":
         results["z", axis] = phi[0, axis]
@@ -46,9 +47,10 @@ def space_cosines(top: int) -> dict[tuple[str, str], np.ndarray]:
     return results
 
 
-def rotor_matrix(axis: str, top: int) -> np.ndarray:
+@cache
+def rotor_matrix(axis: str, top: int, z: str = "a") -> np.ndarray:
     """N_axis of the molecule on |N k m⟩."""
-    return block_diag(*(np.kron(momenta(n, "a")[axis], np.eye(2 * n + 1)) for n in range(top + 1)))
+    return block_diag(*(np.kron(momenta(n, z)[axis], np.eye(2 * n + 1)) for n in range(top + 1)))
 
 
 def on_spins(rotor: np.ndarray, spins2: tuple[int, ...], acting: dict[int, np.ndarray]) -> np.ndarray:

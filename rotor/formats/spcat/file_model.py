@@ -19,8 +19,8 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import (
     EVEN_ORDER,
     DipoleCode,
     Dipoles,
-    is_vector,
     line_moment,
+    moment_species,
     split_dipoles,
 )
 from rotor.formats.spcat.hamiltonian.entries import Connected, FileEffect
@@ -315,11 +315,11 @@ def _group_moments(
     )
     if light.phases.odd:
         fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
-        with_axes = [
-            (each, code.axis if is_vector(code) else 0) for each, (_, code) in zip(beside, acting, strict=True)
+        with_species = [
+            (each, moment_species(code, coded.axes)) for each, (_, code) in zip(beside, acting, strict=True)
         ]
         phases = with_dipoles(fixed, light.axes_within_states, coded.oblate, False)
-        return turned_moments(moments, with_axes, turned, phases)
+        return turned_moments(moments, with_species, turned, phases)
     if light.phases.between_i:
         return by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
     return moments, beside

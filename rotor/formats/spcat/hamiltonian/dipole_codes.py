@@ -226,10 +226,13 @@ def _is_turned(code: DipoleCode) -> bool:
     return code.typ in (8, 11) or (code.typ in (1, 2) and code.axis > 0) or (code.typ == 12 and code.axis == 0)
 
 
-def is_vector(code: DipoleCode) -> bool:
-    """Whether a moment is a vector along an axis, times numbers that no half turn changes."""
-    between_states = code.states[0] != code.states[1]
-    return bool(code.axis) and not code.spin and code.typ in (3, 5, 7, 9, 10) and not (code.typ == 5 and between_states)
+def moment_species(code: DipoleCode, axes: str) -> str:
+    """The species of a moment under half turns, "" if none changes its sign: that of SYM, times that of z for i sin and i{Nz, }."""
+    along = "abc"[code.axis - 1] if code.axis else ""
+    if code.typ not in (8, 12):
+        return along
+    z = axes[2]
+    return z if not along else "" if along == z else next(axis for axis in "abc" if axis not in (along, z))
 
 
 def _with_n2(operator: Operator, typ: int) -> Operator:

@@ -150,35 +150,40 @@ def _in_phases(moment: Moment, by_order: bool, turned: str = "") -> Moment:
 
 
 def turned_moments(
-    moments: dict[tuple[int, int], Vector], beside: Sequence[tuple[Moment, int]], turned: str, phases: Phases
+    moments: dict[tuple[int, int], Vector], beside: Sequence[tuple[Moment, str]], turned: str, phases: Phases
 ) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
     """The moments in functions that time reversal with half a turn about an axis leaves as they are: those along it, and the others
     apart, each component by itself.
 
-    moments: plain dipoles by pairs of states. beside: other moments with their axes, 1 to 3, 0 for those that are no vectors along an axis.
-    turned: the axis whose half turn accompanies time reversal; "" if there is none. phases: phases that decide which components have the
-    factor i.
+    moments: plain dipoles by pairs of states. beside: other moments with their species under half turns: "a", "b", "c", "" if none changes
+    their sign. turned: the axis whose half turn accompanies time reversal; "" if there is none. phases: phases that decide which components
+    have the factor i.
     Returns: unchanged plain dipoles; all other moments.
     """
-    if any(not axis and (moment.electric or not isinstance(moment.rotor, Cosines)) for moment, axis in beside):
+    if any(species and not moment.electric for moment, species in beside):
         raise ValueError(
-            "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
+            "magnetic moments that a half turn changes (SYM 0 with TYP 8 or 12) with operators that are odd under time reversal within one "
             f"state, or PHASE, {PLURAL_NOT_YET}; leave one of them out"
         )
-    plain, others = dict[tuple[int, int], Vector](), [moment for moment, axis in beside if not axis]
+    plain, others = dict[tuple[int, int], Vector](), list[Moment]()
     for states, along in moments.items():
-        for axis, value in enumerate(along, 1):
-            alone = (value * (axis == 1), value * (axis == 2), value * (axis == 3))
+        for axis, value in zip("abc", along, strict=True):
+            alone = (value * (axis == "a"), value * (axis == "b"), value * (axis == "c"))
             moment = _turned(Moment(1.0, states, Cosines(alone)), axis, turned, phases)
             if value and moment.rotor == Cosines(alone) and not moment.imaginary:
                 plain[states] = tuple(np.add(alone, plain.get(states, (0.0, 0.0, 0.0))).tolist())
             elif value:
                 others.append(moment)
-    return plain, (*others, *(_turned(moment, axis, turned, phases) for moment, axis in beside if axis))
+    magnetic = [moment for moment, _ in beside if not moment.electric]
+    return plain, (
+        *magnetic,
+        *others,
+        *(_turned(moment, species, turned, phases) for moment, species in beside if moment.electric),
+    )
 
 
-def _turned(moment: Moment, axis: int, turned: str, phases: Phases) -> Moment:
-    """A moment along an axis (1 to 3) in functions that time reversal with a half turn leaves as they are."""
-    letter, between = "abc"[axis - 1], moment.states[0] != moment.states[1]
-    has_i = between and (letter in phases.odd) != phases.between_i
-    return _in_phases(moment, has_i, "" if letter == turned else turned)
+def _turned(moment: Moment, species: str, turned: str, phases: Phases) -> Moment:
+    """A moment of a species in functions that time reversal with a half turn leaves as they are."""
+    between = moment.states[0] != moment.states[1]
+    has_i = between and (species in phases.odd) != phases.between_i
+    return _in_phases(moment, has_i, "" if species in ("", turned) else turned)

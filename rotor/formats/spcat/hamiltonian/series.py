@@ -9,7 +9,7 @@ and its notes 1, 3, 6 and 11; Euler series: J. Mol. Spectrosc. 233, 174 (2005)):
 | FF = 10 + n | the sine of the same; 31 to 40: n = FF - 20, ... |
 | FF = 11 to 20, 31 to 40, of K and -K | 0, as the program has it (it follows where the two ρ are one) |
 | the same with NOFC | 1 where \\|K' + K''\\|/2 = n (n - ½ where ΔK is odd), else 0; for a sine the sign of K' + K'' |
-| EX = n + 1 | ½(f' + f''), f = ((N² - K²)/D)^NSQ (K²/D)^KSQ, D = 1 + a K² + b (N² - K²); f/D but for TYP 0 with EX = 1 |
+| EX = n + 1 | ½(f' + f''), f = ((N² - K²)/D)^NSQ (K²/D)^KSQ, D = 1 + a K² + b (N² - K²); f/D but for TYP 0 with EX = 1 and no spin |
 | EX with TYP 1 to 3 | the same of each part: K² counts as KSQ + 1, ½N² and -½K² of Nb² and Nc² as NSQ + 1 and KSQ + 1, ¼(N₊² + N₋²) as 1 |
 | TYP 90 + 2n | the same of N₊^2n + N₋^2n, f/D for n > 0; TYP 91 with KSQ of 2 to 9: TYP 90 with KSQ + 8 |
 | TYP 91, KSQ = NSQ = 0 | the constant ρ of a state |

@@ -176,6 +176,14 @@ def test_what_is_complex_in_all_phases_is_refused(parameters, says):
         _energies(_file((*ABC, *parameters)), 2)
 
 
+@pytest.mark.parametrize("dipole", ["81010 1.0", "120100 1.0"])
+def test_magnetic_moments_that_a_half_turn_changes_are_refused(dipole):
+    request = read_int(f"a case\n0 41 1 0 4 -90 -90 99999 300\n 1 1.0\n {dipole}\n".encode())
+    file = _file((*ABC, (11, 700.0), (200099, 90.0), (910099, 0.4)), nvib=2)
+    with pytest.raises(ValueError, match="SYM 0 with TYP 8 or 12"):
+        connected_groups(file, request)
+
+
 def test_they_have_no_names():
     with pytest.raises(ValueError, match="odd under time reversal"):
         named_top(_file((*ABC, (200099, 70.0))))

@@ -2,7 +2,7 @@
 
 Up to three states with interactions, two spins and moments of every TYP within and between states; l-doubled pairs of a threefold axis.
 Strengths of lines between groups of close levels are compared in sum, since round-off mixes such levels, and both ways, so that no line
-is missing. Not covered: series, equivalent spins with a total, and the names of levels.
+is missing. Series, PHASE, IXX and equivalent spins with a total are in `test_random_codes`. Not covered: the names of levels.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ from full_matrix import pieces, term_matrix
 from full_matrix_codes import Case
 from full_matrix_l_doubled import l_doubled_solution
 from full_matrix_moments import Moment, strengths
+from lines_of_levels import compare_levels, compare_lines, groups_of_close, summed
 from random_spcat import RIGID, RandomFile, file_of_l, file_of_states, with_both_of_pairs
 
-from rotor.formats.spcat.file_model import Group, connected_groups
-from rotor.quantum.levels import Levels
-from rotor.spectra.transitions.pairs import all_transitions
+from rotor.formats.spcat.file_model import connected_groups
 
-CLOSE = 1e-6  # of the largest energy; round-off of 1e-15 of it mixes closer levels by more than 1e-9
 # states, spins, whether with ranges of K
 STATES = [(1, 1, False), (1, 2, False), (2, 0, False), (2, 1, False), (2, 2, False), (3, 0, False), (3, 1, False),
           (1, 2, True), (2, 1, True), (3, 0, True)]  # fmt: skip
@@ -39,56 +37,20 @@ def _compare(file: RandomFile, solution=_solution, count_of_f: int = 3) -> int:
     case = file.case
     half = sum(case.states[0].spins2) % 2
     solved = {f2: solution(case, f2) for f2 in range(half, half + 2 * count_of_f, 2)}
-    size = max(np.abs(energy).max(initial=0.0) for _, _, energy in solved.values())
-    close = {f2: np.cumsum(np.diff(energy, prepend=energy[:1]) > CLOSE * size) for f2, (_, _, energy) in solved.items()}
+    energies = {f2: energy for f2, (_, _, energy) in solved.items()}
+    size = max(np.abs(energy).max(initial=0.0) for energy in energies.values())
+    close = groups_of_close(energies, size)
     groups = [
         (group, group.levels((min(solved), max(solved)))) for group in connected_groups(file.par, file.intensities)
     ]
-    _compare_levels(file, groups, solved, size)
+    compare_levels(groups, energies, size, file.text)
     expected = {
-        (f, g): _sums(strengths(case, file.moments, solved[f][:2], solved[g][:2]), close[f], close[g])
+        (f, g): summed(strengths(case, file.moments, solved[f][:2], solved[g][:2]), close[f], close[g])
         for f in solved
         for g in (f, f - 2)
         if g in solved and len(close[f]) and len(close[g])
     }
-    ours = {pair: np.zeros_like(sums) for pair, sums in expected.items()}
-    for group, levels in groups:
-        _add_lines(ours, group, levels, solved, close)
-    largest, count = max(sums.max() for sums in expected.values()), 0
-    for (f, g), sums in expected.items():
-        mine = ours[f, g]
-        if f == g:  # a line is listed once, from either level
-            mine, sums = np.triu(mine + mine.T, 1), np.triu(sums, 1)
-        wrong = np.abs(mine - sums) > 1e-9 * largest + 1e-7 * sums
-        assert not wrong.any(), (file.text, f, g, mine[wrong], sums[wrong])
-        count += int((sums > 1e-9 * largest).sum())
-    return count
-
-
-def _compare_levels(file: RandomFile, groups: list[tuple[Group, Levels]], solved, size: float) -> None:
-    of_f = np.concatenate([np.repeat(levels.multiplicity - 1, levels.components) for _, levels in groups])
-    energies = np.concatenate([np.repeat(levels.energy_mhz, levels.components) for _, levels in groups])
-    for f2, (_, _, energy) in solved.items():
-        np.testing.assert_allclose(np.sort(energies[of_f == f2]), energy, rtol=0, atol=1e-13 * size, err_msg=file.text)
-
-
-def _sums(strength: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    sums = np.zeros((rows[-1] + 1, columns[-1] + 1))
-    np.add.at(sums, (rows[:, None], columns), strength)
-    return sums
-
-
-def _add_lines(ours, group: Group, levels: Levels, solved, close) -> None:
-    """Add the lines of a group to the sums between groups of close levels."""
-    of_f = (levels.multiplicity - 1).tolist()
-    place = [
-        close[f2][np.abs(solved[f2][2] - energy).argmin()]
-        for f2, energy in zip(of_f, levels.energy_mhz.tolist(), strict=True)
-    ]
-    lines = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
-    for *rows, strength in zip(lines.upper.tolist(), lines.lower.tolist(), lines.strength_debye2.tolist(), strict=True):
-        up, low = sorted(rows, key=lambda row: -of_f[row])
-        ours[of_f[up], of_f[low]][place[up], place[low]] += strength
+    return compare_lines(groups, energies, close, expected, file.text)
 
 
 @pytest.mark.parametrize(("states", "spins", "limits"), STATES)
@@ -144,8 +106,8 @@ def test_l_doubled_states_of_other_folds(iax, fold, nvib):
         parameters = [(1099, 3000.0), (199, 5000.0), (11, 20000.0), (z, 2000.0), *doubling]
         file = RandomFile.of(0, options, parameters, [Moment((0, 0), 0, 1, 1.0)])
         groups = [(group, group.levels((0, 8))) for group in connected_groups(file.par, file.intensities)]
-        solved = {f2: l_doubled_solution(file.case, f2) for f2 in range(0, 10, 2)}
-        _compare_levels(file, groups, solved, max(energy.max() for _, _, energy in solved.values()))
+        energies = {f2: l_doubled_solution(file.case, f2)[2] for f2 in range(0, 10, 2)}
+        compare_levels(groups, energies, max(energy.max() for energy in energies.values()), file.text)
 
 
 @pytest.mark.slow
