@@ -62,6 +62,12 @@ def test_chance_matches_are_those_of_random_positions() -> None:
     assert abs((hits >= 2).sum() - expected) < 4 * np.sqrt(expected)
 
 
+def test_chance_matches_of_thousands_of_lines_are_finite() -> None:
+    """The binomial coefficients of more than 1029 lines are beyond doubles: half of all lines are seen by chance in half of the cases."""
+    assert chance_matches(2001, 4001, 0.5, 20) == pytest.approx(10.0)  # by symmetry
+    assert chance_matches(0, 4001, 0.5, 20) == 20.0
+
+
 def test_noise_alone_needs_nothing(case: tuple) -> None:
     _, candidates, _ = case
     silent = observed_spectrum(GRID, np.random.default_rng(3).normal(0, 0.05, len(GRID)), noise=0.05)

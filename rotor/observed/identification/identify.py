@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -202,13 +201,12 @@ def chance_matches(visible: int, expected: int, occupied: float, candidates: int
 
     n Σ_k≥v (m k) f^k (1 - f)^(m-k) with v visible of m expected lines, the share f of channels with a signal, and n candidates.
 
-    >>> chance_matches(1, 1, 0.1, 20), round(chance_matches(4, 4, 0.1, 20), 6)
+    >>> round(chance_matches(1, 1, 0.1, 20), 6), round(chance_matches(4, 4, 0.1, 20), 6)
     (2.0, 0.002)
     """
-    terms = (
-        math.comb(expected, k) * occupied**k * (1 - occupied) ** (expected - k) for k in range(visible, expected + 1)
-    )
-    return candidates * math.fsum(terms)
+    from scipy.special import bdtrc
+
+    return candidates * float(bdtrc(visible - 1, expected, occupied))
 
 
 def _lines_seen(spectrum: ObservedSpectrum, alone: Floats) -> tuple[int, int]:
