@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -102,22 +102,25 @@ def check_apart(atoms: Atoms, bodies: Bodies) -> None:
         )
 
 
-def relax(atoms: Atoms, steps: int = RELAXING_STEPS, **how: Any) -> None:
+def relax(
+    atoms: Atoms, steps: int = RELAXING_STEPS, progress: Callable[[int, int, float], None] = lambda *_: None, **how: Any
+) -> None:
     """Remove overlaps in place by a quench: a molecule that moves against its force is stopped.
 
     Steps of 1 fs; speeds are limited to those of 300 K. The result is not an energy minimum, but a valid start of a motion. Momenta are
-    discarded. how: as for `RigidDynamics`.
+    discarded. progress: called with step, steps and 0 at the start and after each step. how: as for `RigidDynamics`.
     """
     from ase.units import fs
 
     from rotor.fluids.motion.dynamics import RigidDynamics
 
+    progress(0, steps, 0.0)
     atoms.set_momenta(np.zeros((len(atoms), 3)))
     dynamics = RigidDynamics(atoms, RELAXING_FS * fs, **{**how, "removed": 0})
     bodies, state = dynamics.bodies, dynamics.state
     kt = RELAXING_K * units.EV_PER_K
     fastest, widest = np.sqrt(bodies.mass * kt)[:, None], np.sqrt(bodies.moments * kt)
-    for _ in range(steps):
+    for step in range(1, steps + 1):
         dynamics.step()
         dynamics.nsteps += 1
         force, torque = dynamics.wrench()
@@ -130,6 +133,7 @@ def relax(atoms: Atoms, steps: int = RELAXING_STEPS, **how: Any) -> None:
         np.clip(state.momentum, -fastest, fastest, out=state.momentum)
         state.spin[:, :3] = np.clip(state.angular, -widest, widest)
         dynamics.write_momenta()
+        progress(step, steps, 0.0)
     atoms.set_momenta(np.zeros((len(atoms), 3)))
 
 

@@ -213,7 +213,8 @@ def answer_fluid(
     resume : bool
         Continue from `outputs.checkpoint`; only with the engine rotor.
     progress : callable, optional
-        Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+        Called with step, steps and ns per day from time to time, in turn for the quench of a new box (at 0 ns per day), the
+        equilibration and the run; without it a bar is shown on a terminal.
     on_start : callable
         Called after all checks.
 
@@ -232,7 +233,8 @@ def answer_fluid(
     built_in = request.engine == "rotor"
     if not built_in and (outputs.checkpoint or resume):
         raise ValueError(f"engine {request.engine}: checkpoints are written by the engine rotor alone")
-    atoms = make_box(request, relaxed=not resume)
+    with progress_bar(progress, "overlaps of the new box: {task.completed} of {task.total} steps", "") as shown:
+        atoms = make_box(request, relaxed=not resume, progress=shown)
     settings = request.settings
     speeds = "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
     start = f"resumed from {outputs.checkpoint}" if resume else f"{request.start}; velocities {speeds}"
@@ -267,8 +269,11 @@ def _motion(atoms: Atoms, settings: Settings, frames: MotionFrames) -> tuple[lis
     return motion_means(frames, interval_ps, reference_axes(bodies, find_models(settings.model)))
 
 
-def make_box(request: FluidRequest, relaxed: bool = True) -> Atoms:
-    """The box of a request; a `NewBox` is made. relaxed: False: without the quench, as for a resumed run."""
+def make_box(request: FluidRequest, relaxed: bool = True, progress: Progress = lambda *_: None) -> Atoms:
+    """The box of a request; a `NewBox` is made.
+
+    relaxed: False: without the quench, as for a resumed run. progress: of the quench.
+    """
     if not isinstance(request.box, NewBox):
         return request.box
     model, settings = find_model(request.settings.model), request.settings
@@ -276,7 +281,7 @@ def make_box(request: FluidRequest, relaxed: bool = True) -> Atoms:
     atoms = lattice_box(model, request.box.molecules, request.box.density_g_cm3, rng)
     atoms.calc = make_calculator(settings, request.threads)
     if relaxed:
-        relax(atoms, shapes=model_shapes([model]))
+        relax(atoms, progress=progress, shapes=model_shapes([model]))
     return atoms
 
 

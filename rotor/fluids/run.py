@@ -51,6 +51,7 @@ MAY_CHANGE = ("steps",)  # settings that may differ in a resumed run
 BAR_INTERVAL_S = 0.2
 
 Progress = Callable[[int, int, float], None]
+SPEED = ", {task.fields[speed]:.3g} ns/day"  # text of a progress bar
 
 
 @dataclass(frozen=True)
@@ -388,16 +389,16 @@ def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
 
 @contextmanager
 def progress_bar(
-    progress: Progress | None = None, steps: str = "{task.completed} of {task.total} steps"
+    progress: Progress | None = None, steps: str = "{task.completed} of {task.total} steps", speed: str = SPEED
 ) -> Iterator[Progress]:
-    """The receiver of progress: the caller's function, a bar on a terminal, or none. steps: text of the bar."""
+    """The receiver of progress: the caller's function, a bar on a terminal, or none. steps, speed: text of the bar."""
     if progress is not None or not sys.stderr.isatty():
         yield progress or (lambda step, steps, speed: None)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    text = TextColumn(steps + ", {task.fields[speed]:.3g} ns/day")
+    text = TextColumn(steps + speed)
     with Progress(BarColumn(), text, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", visible=False, speed=0.0)
         yield lambda step, steps, speed: bar.update(task, completed=step, total=steps, speed=speed, visible=True)

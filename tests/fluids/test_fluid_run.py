@@ -355,10 +355,22 @@ def test_a_terminal_sees_the_steps_of_the_equilibration_and_of_the_run(monkeypat
     """The bar counted the steps of an equilibration as 5000 of 0."""
     monkeypatch.setattr("sys.stderr", terminal := Terminal())
     answer_fluid(FluidRequest(NewBox(64, equilibration_ps=0.4), replace(SETTINGS, cutoff_angstrom=6.0, steps=20)))
-    totals = set(re.findall(r"of (\w+) steps", terminal.getvalue()))
+    totals = set(re.findall(r"(?<!box: )\b\d+ of (?:at most )?(\w+) steps", terminal.getvalue()))
     assert "20" in totals
     assert len(totals) == 2
     assert not totals & {"0", "None"}
+
+
+def test_a_terminal_sees_the_quench_of_a_new_box_from_its_start(monkeypatch):
+    """A box of 30000 molecules is quenched for more than half a minute."""
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    seen = []
+    request = FluidRequest(NewBox(27, equilibration_ps=0.0), replace(SETTINGS, cutoff_angstrom=4.0, steps=20))
+    answer_fluid(request)
+    assert "overlaps of the new box: 300 of 300 steps" in terminal.getvalue()
+    answer_fluid(request, progress=lambda *state: seen.append(state))
+    assert seen[:2] == [(0, 300, 0.0), (1, 300, 0.0)]
+    assert seen[-1][:2] == (20, 20)
 
 
 @pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:3000])])
