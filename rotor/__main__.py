@@ -8,8 +8,6 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
-from pathlib import Path
 
 
 def start_workers_ahead(arguments: Sequence[str]) -> None:
@@ -17,10 +15,9 @@ def start_workers_ahead(arguments: Sequence[str]) -> None:
     if arguments[:1] != ["run"] or not re.search(r"--workers[= ]0*([2-9]|[1-9]\d+)(?!\S)", " ".join(arguments)):
         return
     from rotor.scenes.worker_processes import start_ahead
+    from rotor.verbs import scene_text
 
-    files = (Path(word) for word in arguments[1:])
-    with suppress(OSError, ValueError):
-        start_ahead(next((path.read_text(encoding="utf-8") for path in files if path.is_file()), ""))
+    start_ahead(scene_text(arguments[1:]))
 
 
 def main() -> None:

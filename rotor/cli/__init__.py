@@ -7,7 +7,6 @@ only after a verb has checked its input.
 from __future__ import annotations
 
 import os
-import re
 import shlex
 import signal
 import sys
@@ -22,7 +21,7 @@ import typer
 
 from rotor.checks import NoAnswerError, RunStopped, require_file
 from rotor.cli import process
-from rotor.verbs import declared_verbs, has_small_blocks
+from rotor.verbs import declared_verbs, has_small_blocks, highest_j_in, kind_in, scene_text
 
 if TYPE_CHECKING:
     from rotor.verbs.common.verb import Verb
@@ -58,6 +57,7 @@ VERBS = {  # with their lines in the list of verbs, short enough for 80 columns
 }
 VERBS |= {name: "" for name in declared_verbs() if name not in VERBS}  # the list shows a new verb's declaration
 FILES = {"run": "run_scene"}  # a verb whose name is that of a function of this module
+WITH_SCENE = ("run", "plan", "accuracy")
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
@@ -190,9 +190,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         arguments = ["--debug", *(word for word in arguments if word != "--debug")]
     words = [word for word in arguments[:2] if word != "--debug"]
     is_verb = bool(words) and words[0] in VERBS
-    if is_verb and has_small_blocks(words[0]):  # the limit must be set before numpy is loaded
-        jmax = re.search(r"--jmax[= ](\d+)(?!\S)", " ".join(arguments))  # before anything is read
-        process.one_thread_of_blas(int(jmax[1]) if jmax else None)
+    if is_verb:
+        _limit_threads(words[0], arguments)
     # undecodable bytes of file names are read as UTF-8, or shown as �
     provenance = shlex.join(["rotor", *arguments]).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     try:
@@ -217,6 +216,16 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return _fail(*_failure(error, arguments), arguments)
     finally:
         process.HELD.close()
+
+
+def _limit_threads(verb: str, arguments: Sequence[str]) -> None:
+    """One thread of BLAS where the verb, or the kind of its scene, has small blocks. The limit must be set before numpy is loaded."""
+    text = " ".join(arguments)
+    if verb in WITH_SCENE:
+        text = scene_text(arguments[1:])
+        verb = kind_in(text)
+    if has_small_blocks(verb):
+        process.one_thread_of_blas(highest_j_in(text))
 
 
 def _failure(error: Exception, arguments: list[str]) -> tuple[int, str]:

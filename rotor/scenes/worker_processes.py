@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import gc
 import os
-import re
 import signal
 import sys
 import threading
@@ -46,7 +45,6 @@ _SMILES_MODULES = (
     "rotor.molecules.symmetry.point_group",
     "rotor.tops.spins.spin_statistics",
 )
-_KIND = re.compile(r"""\bkind"?\s*[=:]\s*["'](\w+)["']""")
 
 
 class WorkerKilledError(RuntimeError):
@@ -112,7 +110,9 @@ def start_ahead(scene_text: str = "") -> None:
         return
     from multiprocessing import forkserver
 
-    kinds = tuple(f"rotor.verbs.{name}" for name in _KIND.findall(scene_text)[:1])
+    from rotor.verbs import kind_in
+
+    kinds = tuple(f"rotor.verbs.{name}" for name in [kind_in(scene_text)] if name)
     smiles = (
         _SMILES_MODULES
         if any(sign in scene_text for sign in ("SMILES:", "InChI=", ".csv", ".smi", ".sdf", ".mol"))
