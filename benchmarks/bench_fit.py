@@ -23,7 +23,7 @@ from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import Parameters, parameters
 from rotor.fitting.result import Fit
 from rotor.fitting.search.residuals import Search
-from rotor.quantum.labelled import LevelModel, level_model
+from rotor.quantum.labels.labelled import LevelModel, level_model
 from rotor.quantum.solve import solve_levels
 from rotor.statistics.least_squares import _Linear, _State
 from rotor.tops.constants.constants import Constants

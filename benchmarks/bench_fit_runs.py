@@ -189,7 +189,7 @@ def iteration(folder: Path) -> float:
     from rotor.fitting.assignment import levels_in
     from rotor.fitting.search.residuals import Search
     from rotor.formats.spcat.fits.fit_input import read_fit
-    from rotor.quantum.labelled import level_model
+    from rotor.quantum.labels.labelled import level_model
     from rotor.statistics.least_squares import _Linear, _State
 
     fit_input = read_fit(folder / "case.par")

@@ -22,7 +22,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import cosine_bands
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.solved_space import SolvedSpace
-from rotor.quantum.tensors import frame_of, phase_exponent
+from rotor.quantum.operators.tensors import frame_of, phase_exponent
 
 Complexes = NDArray[np.complex128]
 EvenFunction = Callable[[Floats], Floats]

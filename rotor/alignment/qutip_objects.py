@@ -25,7 +25,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import cosine_bands
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.solved_space import field_space
-from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.operators.symmetric_top_elements import coupling
 from rotor.tops.top import require_single_state
 
 if TYPE_CHECKING:

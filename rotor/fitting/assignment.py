@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.quanta import label_value
+from rotor.quantum.labels.quanta import label_value
 from rotor.table import Table, counted
 
 

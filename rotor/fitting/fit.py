@@ -25,7 +25,7 @@ from rotor.fitting.search.residuals import FitOptions as FitOptions
 from rotor.fitting.search.residuals import Search, line_errors, round_off, too_few
 from rotor.fitting.search.strategies import with_rejection
 from rotor.fitting.top_constants import ConstantSet
-from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.quantum.labels.labelled import LevelModel, MissingLevelsError
 from rotor.requests.budget import ROUNDING
 from rotor.statistics.least_squares import EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression

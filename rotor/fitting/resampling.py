@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.result import Fit
-from rotor.quantum.labelled import LevelModel
+from rotor.quantum.labels.labelled import LevelModel
 
 
 def bootstrap(

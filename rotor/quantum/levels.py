@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints, matching_rows
 from rotor.frozen import dataclass
-from rotor.quantum.quanta import labels as texts_of_labels
+from rotor.quantum.labels.quanta import labels as texts_of_labels
 from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.table import Table
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -136,7 +136,7 @@ class Levels(Table):
 
     kind: of the top. representation: of the Wang functions, None for closed forms. jmax: the highest rotational angular
     momentum in the basis. energy_mhz: E/h in MHz from the Hamiltonian's zero. quanta: the quantum numbers that the case
-    has, by name (see `rotor.quantum.quanta`); a symmetric top has one row for both signs of K, linear and spherical tops
+    has, by name (see `rotor.quantum.labels.quanta`); a symmetric top has one row for both signs of K, linear and spherical tops
     have j alone. multiplicity: states of one component that differ in their projection in space, 2J+1 (2F+1 with spins, 1 where M
     is resolved). components: levels that coincide in the row (2 for ±K, 2J+1 for a spherical top). weight:
     nuclear-spin weight summed over the components. halves: names whose column holds twice the quantum number.

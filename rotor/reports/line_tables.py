@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dict[str, Any]]:
     """The strongest patterns of lines that a resolution merges, ordered by frequency."""
-    from rotor.quantum.quanta import labels, rotational_quanta
+    from rotor.quantum.labels.quanta import labels, rotational_quanta
     from rotor.spectra.intensity import largest
     from rotor.spectra.patterns import patterns
 
@@ -90,7 +90,7 @@ def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
 
 def states_text(lines: Any) -> str:
     """Headings of the quantum numbers that label the states of lines."""
-    from rotor.quantum import quanta
+    from rotor.quantum.labels import quanta
 
     return f"(states: {quanta.headings(lines.quanta_names)})"
 

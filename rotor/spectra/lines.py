@@ -32,8 +32,8 @@ from rotor.quantum.estimates.budgets import (
     without_errors,
 )
 from rotor.quantum.estimates.convergence import warnings_of
+from rotor.quantum.labels.quanta import heading
 from rotor.quantum.levels import Levels, TransitionTable
-from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.tabulated import tabulated_line_errors
 from rotor.spectra.intensity import (

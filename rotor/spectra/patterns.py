@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_positive
-from rotor.quantum.quanta import rotational_quanta
+from rotor.quantum.labels.quanta import rotational_quanta
 from rotor.spectra.lines import Lines
 from rotor.table import Table
 

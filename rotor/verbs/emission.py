@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.checks import require_file
 from rotor.frozen import dataclass
-from rotor.quantum.quanta import headings
+from rotor.quantum.labels.quanta import headings
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, listed, record_table, table_records
 from rotor.reports.top_facts import error_facts, hyperfine_lines, short_source

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rotor.frozen import dataclass
-from rotor.quantum import quanta
-from rotor.quantum.quanta import headings
+from rotor.quantum.labels import quanta
+from rotor.quantum.labels.quanta import headings
 from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title

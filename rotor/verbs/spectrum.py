@@ -10,7 +10,7 @@ from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.quantum.estimates.budgets import ESTIMATES
-from rotor.quantum.quanta import headings, rotational_quanta
+from rotor.quantum.labels.quanta import headings, rotational_quanta
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part

@@ -88,7 +88,7 @@ def _modelled(series: Series, predicted: Predicted) -> Centres:
 
 def label_rows(model: Model, levels: object, labels: Ints) -> Ints:
     """Rows of levels by their labels; -1 for labels without a level."""
-    from rotor.quantum.quanta import SPECIES_NUMBERS
+    from rotor.quantum.labels.quanta import SPECIES_NUMBERS
 
     letters = {number: letter for letter, number in SPECIES_NUMBERS.items()}
     columns = {

@@ -25,8 +25,8 @@ from rotor.fitting.parameters import with_names
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.formats.lines.assigned_lines import QUANTA
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.labelled import MissingLevelsError
-from rotor.quantum.quanta import SPECIES_NUMBERS
+from rotor.quantum.labels.labelled import MissingLevelsError
+from rotor.quantum.labels.quanta import SPECIES_NUMBERS
 from rotor.spectra.intensity import highest_j
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.thermodynamics.sums.partition import partition_function

@@ -145,7 +145,7 @@ def test_command_with_pictures(call: Call, folder: Path) -> None:
 def test_strongest_lines_are_named_above_their_peaks() -> None:
     from rotor.plots.spectra.over import over_figure
     from rotor.plots.view import View
-    from rotor.quantum.quanta import line_text
+    from rotor.quantum.labels.quanta import line_text
 
     lines, peaks = known_lines(temperature_k=2.0, dipole=(0.0, 1.0, 0.6)), spectrum()
     heights = fit_intensities(lines, peaks).heights(lines)

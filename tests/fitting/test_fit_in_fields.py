@@ -11,7 +11,7 @@ import pytest
 from rotor.fitting.levels.stark_levels import stark_levels
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.fits.fit_request import answer_fit, lines_request
-from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM
+from rotor.quantum.labels.quanta import FIELD_STEP_KV_PER_CM
 from rotor.spectra.fields.lines import field_lines
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top

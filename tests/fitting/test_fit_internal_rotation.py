@@ -10,7 +10,7 @@ from rotor.fitting.fit import fit_lines
 from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.quantum.labelled import MissingLevelsError
+from rotor.quantum.labels.labelled import MissingLevelsError
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM

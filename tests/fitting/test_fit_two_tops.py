@@ -10,7 +10,7 @@ from rotor.fitting.fit import fit_lines
 from rotor.fitting.levels.top_levels import label_model
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.quantum.quanta import SPECIES_NUMBERS
+from rotor.quantum.labels.quanta import SPECIES_NUMBERS
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = units.MHZ_PER_CM

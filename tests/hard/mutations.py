@@ -168,7 +168,7 @@ MUTATIONS = (
         "tests/statistics/test_least_squares.py::test_what_is_not_determined_is_named",
     ),
     Mutation(
-        18, "rotor/quantum/label_tracking.py",
+        18, "rotor/quantum/labels/tracking.py",
         "        if not moved.any():", "        if True:",
         "tests/fitting/test_fit_spcat.py::test_labels_follow_their_states_where_energies_cross",
     ),

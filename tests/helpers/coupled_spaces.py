@@ -13,8 +13,8 @@ from itertools import product
 import numpy as np
 
 from rotor.quantum.blocks.connected import connected_parts, elements_by_blocks
+from rotor.quantum.operators.wigner import nine_j
 from rotor.quantum.spins.coupling import reduced_spin
-from rotor.quantum.wigner import nine_j
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,8 @@ import numpy as np
 
 from rotor.quantum.basis.labelled import Basis, rotation_labels
 from rotor.quantum.operators.rotation import sum_of_powers
+from rotor.quantum.operators.symmetric_top_elements import coupling
+from rotor.quantum.operators.tensors import block_elements, phase_exponent
 from rotor.quantum.spins.scheme import (
     AxialState,
     ByElements,
@@ -15,8 +17,6 @@ from rotor.quantum.spins.scheme import (
     factors_with_n,
     tensor_of,
 )
-from rotor.quantum.symmetric_top_elements import coupling
-from rotor.quantum.tensors import block_elements, phase_exponent
 
 NOTHING = 1e-13  # round-off of a product of a few numbers, relative to the largest element over |N k⟩
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.operators.symmetric_top_elements import coupling
 
 
 def symmetric_top_elements(j_up: int, j_low: int, components):

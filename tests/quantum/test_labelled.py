@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.labelled import level_model
+from rotor.quantum.labels.labelled import level_model
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top

@@ -32,8 +32,8 @@ from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.operators.algebra import UNIT, Operator, diagonal, half_anticommutator, shift
 from rotor.quantum.operators.rotation import body_tensor, j_squared, j_x, j_y, j_z, ladder, sum_of_powers
-from rotor.quantum.symmetric_top_elements import space_factor
-from rotor.quantum.tensors import spherical_components
+from rotor.quantum.operators.symmetric_top_elements import space_factor
+from rotor.quantum.operators.tensors import spherical_components
 from rotor.quantum.torsion import cosine, p_alpha, sine
 
 ROUNDING = 32 * np.finfo(float).eps  # of the norm of a block

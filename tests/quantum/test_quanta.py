@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotor.quantum import quanta
+from rotor.quantum.labels import quanta
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.tops.top import Top

@@ -16,7 +16,7 @@ from rotor.quantum.blocks.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.label_tracking import TrackedLevels
+from rotor.quantum.labels.tracking import TrackedLevels
 from rotor.quantum.solve import solve_levels
 from rotor.tops.top import Top
 

@@ -15,10 +15,9 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from slow_matrix import AXES, watson_matrix
 
-from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
-from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import coupling, coupling_to
-from rotor.quantum.tensors import (
+from rotor.quantum.blocks.reduced import connected_wang_blocks, wang_amplitudes
+from rotor.quantum.operators.symmetric_top_elements import coupling, coupling_to
+from rotor.quantum.operators.tensors import (
     BodyTensor,
     acting_on,
     axis_order,
@@ -29,8 +28,9 @@ from rotor.quantum.tensors import (
     phase_exponent,
     spherical_components,
 )
+from rotor.quantum.operators.wigner import three_j
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang.basis import REPRESENTATIONS, WangBlock, wang_blocks
-from rotor.quantum.wigner import three_j
 from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import ORACLES
 
-from rotor.quantum import wigner
-from rotor.quantum.wigner import nine_j, six_j, three_j
+from rotor.quantum.operators import wigner
+from rotor.quantum.operators.wigner import nine_j, six_j, three_j
 
 ROUND_OFF = 3e-15  # some twenty correctly rounded factors
 

@@ -9,9 +9,9 @@ import pytest
 
 import rotor
 from rotor import units
-from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
+from rotor.quantum.blocks.reduced import connected_wang_blocks, wang_amplitudes
+from rotor.quantum.operators.tensors import body_tensor
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ
 from rotor.spectra.lines import line_list
 from rotor.spectra.transitions import pairs as transitions

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from slow_matrix import AXES, watson_matrix
 
 import rotor
-from rotor.quantum.reduced import wang_amplitudes
+from rotor.quantum.blocks.reduced import wang_amplitudes
+from rotor.quantum.operators.symmetric_top_elements import coupling
+from rotor.quantum.operators.tensors import body_tensor
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import coupling
-from rotor.quantum.tensors import body_tensor
 from rotor.spectra.raman.raman import anisotropy_angstrom3, band_cross_section, jmax_for_raman, raman_lines
 from rotor.spectra.raman.strengths import anisotropy_squared, raman_transitions
 from rotor.tops.constants.constants import Constants

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
+from rotor.quantum.blocks.reduced import connected_wang_blocks, wang_amplitudes
+from rotor.quantum.operators.tensors import body_tensor
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.tensors import body_tensor
 from rotor.quantum.wang.stacked_blocks import Vector, are_whole, stacked
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import Lines, line_list

@@ -27,7 +27,7 @@ from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.result import Fit
 from rotor.fitting.search.first_values import beside_zero, line_evaluator, weighted_derivatives
 from rotor.fitting.top_constants import ConstantSet
-from rotor.quantum.labelled import LevelModel
+from rotor.quantum.labels.labelled import LevelModel
 from rotor.statistics.least_squares import INTERRUPTED
 from rotor.table import counted
 

@@ -27,8 +27,8 @@ from rotor.quantum.fields.blocks import FieldBlock, FreeLevels
 from rotor.quantum.fields.field_map import smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.solved_space import SolvedSpace
-from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
-from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, label_value
+from rotor.quantum.labels.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
+from rotor.quantum.labels.quanta import FIELD_STEP_KV_PER_CM, label_value
 from rotor.quantum.solve import solve_levels
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM
 

@@ -1,7 +1,7 @@
 """Labelled levels of a top with further states or spins, and their derivatives by its named constants.
 
 The Hamiltonian is that of `rotor.quantum.effects.of_top`, as in predictions. Only the J or F with a level of a line are solved:
-connected Wang blocks of states (`label_tracking`), blocks of one F (`effect_units`), or, for uncoupled states of a symmetric top,
+connected Wang blocks of states (`labels.tracking`), blocks of one F (`effect_units`), or, for uncoupled states of a symmetric top,
 the exact sum E = Σ c ∂E/∂c.
 """
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
+from rotor.quantum.labels.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
+from rotor.quantum.labels.quanta import value_text
 from rotor.quantum.levels import Levels
-from rotor.quantum.quanta import value_text
 from rotor.quantum.solve import solve_levels
 
 
@@ -68,7 +68,7 @@ def _text(constants: TopConstants, label: Ints) -> str:
 
 
 def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
-    from rotor.quantum.label_tracking import labelled_states
+    from rotor.quantum.labels.tracking import labelled_states
 
     labels_by_row = np.column_stack(
         [columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]]
@@ -83,7 +83,7 @@ def _levels_with_spins(
     begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
 ) -> LevelModel:
     from rotor.quantum.estimates.effect_units import assigned_with_spins  # with all that spins need
-    from rotor.quantum.label_tracking import TrackedLevels
+    from rotor.quantum.labels.tracking import TrackedLevels
 
     total = begin.quanta[-1]
     doubled = columns[total] if total in begin.halves else 2 * columns[total]

@@ -33,9 +33,9 @@ from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.rho_axis_tensors import slope_by_tilt
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels
 from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes
-from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.quantum.labels.labelled import LevelModel, MissingLevelsError
+from rotor.quantum.labels.quanta import SPECIES_NUMBERS, value_text
 from rotor.quantum.levels import SolvedBlock, placed
-from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
 from rotor.quantum.spins.linear_blocks import slopes_by_rotation, slopes_by_spins
 from rotor.quantum.spins.rotor import Terms, channels_of
 from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
@@ -188,7 +188,7 @@ def _states_at(blocks: Sequence[SolvedBlock], rows: Ints) -> Iterator[SolvedBloc
 
 
 def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
-    """The model for labels (levels, k) by `constants.quanta`; species are numbered by `rotor.quantum.quanta.SPECIES_NUMBERS`.
+    """The model for labels (levels, k) by `constants.quanta`; species are numbered by `rotor.quantum.labels.quanta.SPECIES_NUMBERS`.
 
     Raises MissingLevelsError for labels without a level.
     """

@@ -20,7 +20,7 @@ from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.result import Fit
 from rotor.fitting.search.residuals import FitOptions, Search, line_errors
 from rotor.fitting.top_constants import ConstantSet, TopConstants
-from rotor.quantum.labelled import MissingLevelsError
+from rotor.quantum.labels.labelled import MissingLevelsError
 
 _STEPS = 4  # iterations to the value that shifts the lines by one error
 _EVEN = 1e-3  # rms difference (errors) of the lines for ± a value below which they depend on its square only

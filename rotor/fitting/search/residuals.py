@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.parameters import Parameters
-from rotor.quantum.labelled import LevelModel
+from rotor.quantum.labels.labelled import LevelModel
 
 LOSSES = ("squares", "huber", "cauchy")
 POOR_RMS = 10.0  # default weighted rms above which the constants do not describe the lines

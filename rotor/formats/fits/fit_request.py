@@ -25,7 +25,7 @@ from rotor.fitting.result import Fit, determined_covariance
 from rotor.fitting.search.first_values import beside_zero
 from rotor.fitting.top_constants import DIPOLES, ConstantSet, TopConstants
 from rotor.formats.lines.assigned_lines import QUANTA, names_field, names_sums, read_assigned_lines
-from rotor.quantum.labelled import LevelModel
+from rotor.quantum.labels.labelled import LevelModel
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.fill import within
 from rotor.statistics.least_squares import Progress

@@ -42,7 +42,7 @@ from rotor.formats.spcat.text.lin import (
     without_v,
     without_zeros_behind,
 )
-from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM
+from rotor.quantum.labels.quanta import FIELD_STEP_KV_PER_CM
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 

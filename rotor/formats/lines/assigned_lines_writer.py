@@ -9,7 +9,7 @@ from rotor.fitting.assignment import Assignments
 from rotor.formats.atomic_write import open_atomic, write_whole
 from rotor.formats.lines.assigned_lin import as_lin
 from rotor.formats.spcat.text.lin import format_lin
-from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, value_text
+from rotor.quantum.labels.quanta import FIELD_STEP_KV_PER_CM, value_text
 from rotor.units import MHZ_PER_CM
 
 

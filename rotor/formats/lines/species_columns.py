@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rotor.quantum.quanta import SPECIES_NUMBERS
+from rotor.quantum.labels.quanta import SPECIES_NUMBERS
 
 SYMBOLS = {"A1": 0, "A2": 0, "E1": 1, "E2": 1, "E+": 1, "E-": 1, "-1": 1}  # of one top, beside A, E, 0 and 1
 WORDS = {"sigma": "species", "symmetry": "species", "sym": "species", "v_t": "vt"}

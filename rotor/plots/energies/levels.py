@@ -26,8 +26,8 @@ from rotor.plots.picture import (
     top_title,
 )
 from rotor.plots.view import WHOLE, View, show_part
+from rotor.quantum.labels.quanta import heading, merged_text, rotational_quanta
 from rotor.quantum.levels import Levels
-from rotor.quantum.quanta import heading, merged_text, rotational_quanta
 from rotor.quantum.request import LevelsAnswer, SelectedLevels
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top

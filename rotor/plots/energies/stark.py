@@ -14,7 +14,7 @@ from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.effects.stark import StarkAnswer
 from rotor.quantum.fields.blocks import BEFORE_J
 from rotor.quantum.fields.field_map import FieldMap
-from rotor.quantum.quanta import as_mathtext
+from rotor.quantum.labels.quanta import as_mathtext
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 

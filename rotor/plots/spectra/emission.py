@@ -10,7 +10,7 @@ from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import GREY, PALETTE, Picture, legend_below, panel, styled, top_title
 from rotor.plots.spectra.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
-from rotor.quantum.quanta import line_text
+from rotor.quantum.labels.quanta import line_text
 from rotor.spectra.emission.request import EmissionAnswer
 from rotor.tops.top import Top
 

@@ -25,7 +25,7 @@ from rotor.plots.picture import (
 )  # fmt: skip
 from rotor.plots.spectra.spectrum import thinned
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.quantum.quanta import line_text
+from rotor.quantum.labels.quanta import line_text
 from rotor.spectra.lines import Lines
 
 MOST_ROWS = 60

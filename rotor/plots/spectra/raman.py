@@ -10,7 +10,7 @@ from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, panel, styled, top_title
 from rotor.plots.spectra.spectrum import MOST_DECADES, VISIBLE
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.quantum.quanta import state_text, without_nuclei
+from rotor.quantum.labels.quanta import state_text, without_nuclei
 from rotor.spectra.raman.raman import RamanLines
 from rotor.spectra.raman.request import RamanAnswer
 

@@ -14,7 +14,7 @@ from rotor.checks import require_choice
 from rotor.plots.names import leave_or_remove
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, panel, styled, top_title
 from rotor.plots.view import Limits, View, show_part
-from rotor.quantum.quanta import line_text, rotational_quanta
+from rotor.quantum.labels.quanta import line_text, rotational_quanta
 from rotor.spectra.lines import Lines
 from rotor.spectra.request import SpectrumAnswer
 from rotor.spectra.spectrum import Spectrum, line_widths

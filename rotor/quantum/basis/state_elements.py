@@ -2,7 +2,7 @@
 
 The elements of ½[Jz^2q, J₊^2n + J₋^2n]₊ in the Wang blocks of every J are made at once, in whole arrays; every state has the same, times
 X^p and the factors of its parameters. Couplings of states, and operators of J that no powers describe, are a unit matrix each. Fits
-(`label_tracking`) and derivatives of levels take their blocks from here.
+(`labels.tracking`) and derivatives of levels take their blocks from here.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
     |J K s)) = i^J φ (|K⟩ + s |-K⟩)/√2 for K > 0,    i^J φ |0⟩ for K = 0,    φ of `wang.basis.phase`
 
-(`quantum.tensors`). A shift of K by q leads from K to K + q and from -K to -K + q, functions of K' = |K + q| and |K - q|. Where both lead
+(`operators.tensors`). A shift of K by q leads from K to K + q and from -K to -K + q, functions of K' = |K + q| and |K - q|. Where both lead
 to one function, and where several shifts do, the elements are added.
 """
 

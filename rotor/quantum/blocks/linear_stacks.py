@@ -7,7 +7,7 @@ one array, padded, so that new constants cost some products of arrays, one diago
     ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_u M_ui Σ_(r,c) U_u(r, c) v_r* v_c
 
 more products for the states that are asked for. `connected` finds the blocks of an operator algebra, `basis.state_elements` and
-`spins.linear_blocks` write those of states and spins, `label_tracking` follows named states while constants change.
+`spins.linear_blocks` write those of states and spins, `labels.tracking` follows named states while constants change.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, symmetric_from_lower
 from rotor.frozen import dataclass
-from rotor.quantum.twisted import twisted
+from rotor.quantum.wang.twisted import twisted
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 _LARGE, _NARROW = 600, 15  # size, and bandwidths in it, from which the banded solver is faster

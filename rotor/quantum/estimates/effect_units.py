@@ -15,7 +15,7 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import linear_blocks_of, vertices_of
 from rotor.quantum.blocks.linear_stacks import LinearBlock
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.label_tracking import (
+from rotor.quantum.labels.tracking import (
     AssignedLevels,
     Follows,
     NamedBlock,

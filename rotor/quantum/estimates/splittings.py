@@ -27,7 +27,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.frozen import dataclass
-from rotor.quantum.wigner import six_j
+from rotor.quantum.operators.wigner import six_j
 from rotor.tops.spins.tensor_elements import chi_tensor
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ With θ between the figure axis and Z, cosθ is the component 00 of D^1, and cos
 
     ⟨J' k M'|D^K_q0|J k M⟩ = c(J → J', 0, k) c(J → J', q, M) / √((2J'+1)(2J+1))
 
-with c from `rotor.quantum.symmetric_top_elements`; k = 0 gives the functions of a linear molecule.
+with c from `rotor.quantum.operators.symmetric_top_elements`; k = 0 gives the functions of a linear molecule.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldOperator, FieldSpace, FreeLevels, Magnet, along
+from rotor.quantum.operators.symmetric_top_elements import coupling_to
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import coupling_to
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -10,7 +10,7 @@ A field acts by a molecule-fixed vector or tensor contracted with a space-fixed 
 
 Cosines have this form too: cosθ of a body axis g and Z is the contraction of the unit vectors g and Z, cos²θ that of gg and ZZ. A
 `Contraction` holds both as Cartesian arrays; in spherical components it is tr·tr/3 and Σ_p S^K_p* T^K_p with the elements of
-`rotor.quantum.tensors`. A `Magnet` is the magnetic moment on which a field along Z acts,
+`rotor.quantum.operators.tensors`. A `Magnet` is the magnetic moment on which a field along Z acts,
 
     ½ Σ g_ij {Φ_Zi, N_j} + Σ_spins g_I I_Z,        times -μ_N B.
 """
@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.labels.quanta import value_text
 from rotor.quantum.levels import Levels
-from rotor.quantum.quanta import value_text
-from rotor.quantum.tensors import Tensors, body_tensor
+from rotor.quantum.operators.tensors import Tensors, body_tensor
 
 ROUND_OFF = 1e-9  # smaller deviations from axial symmetry, relative to the largest element, are ignored
 

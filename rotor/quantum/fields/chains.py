@@ -3,7 +3,7 @@
 Energies at some fields, from LAPACK, are interpolated by a polynomial in √(field - first field) with Chebyshev nodes, which are denser at
 weak fields, where energies bend most.
 
-At all fields they are improved with eigenvectors z from a twisted factorisation (`rotor.quantum.twisted`),
+At all fields they are improved with eigenvectors z from a twisted factorisation (`rotor.quantum.wang.twisted`),
 
     λ ← λ + γ_k/|z|².
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace
-from rotor.quantum.twisted import twisted
+from rotor.quantum.wang.twisted import twisted
 
 Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and the number of its lowest states to solve
 

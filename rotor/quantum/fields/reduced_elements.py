@@ -1,7 +1,7 @@
 """Reduced elements of operators between solved states of any kind, computed at first use.
 
 The states come from `solve_levels`: Wang blocks, interacting states, F blocks with spins, internal rotation with or without spins. Elements
-of molecule-fixed tensors come from `rotor.quantum.reduced`. The magnetic moment is ½ Σ g_ij {Φ_i, N_j} of the rotation in each state, plus
+of molecule-fixed tensors come from `blocks.reduced`. The magnetic moment is ½ Σ g_ij {Φ_i, N_j} of the rotation in each state, plus
 g_I I of the spins.
 """
 
@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.quantum.blocks.reduced import connections, no_elements
 from rotor.quantum.effect import Moment
 from rotor.quantum.fields.blocks import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Connections, Levels
-from rotor.quantum.reduced import connections, no_elements
 
 Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first
 

@@ -5,7 +5,7 @@ reduced elements (`rotor.quantum.fields.reduced_elements`) times a factor of M (
 for all M and fields. No static field connects torsional species. Elements between states of different v_t, whose overlaps are small,
 are neglected: levels shift by less than (μE)²/ΔE, 0.1 MHz at 1 kV/cm for 1 D and 100 cm⁻¹.
 
-Between real functions (`rotor.quantum.tensors`) reduced elements of odd rank are i times real. States of a sector times 1 or i, its
+Between real functions (`operators.tensors`) reduced elements of odd rank are i times real. States of a sector times 1 or i, its
 colour, make all matrices real where such operators lead to the other factor and all others to the same one.
 
 Fields of other directions than Z mix M as asymmetry mixes K. In the contraction Σ_pq S^K_p* T^K_q D^K*_pq of a body tensor T with a space
@@ -13,7 +13,7 @@ tensor S, M and space play the part of k and body,
 
     ⟨J'k'M'|...|J k M⟩ = ⟨J'k'‖T^K‖J k⟩ ⟨J'M'‖S^K*‖J M⟩ / √((2J'+1)(2J+1)),
 
-with the second factor from `rotor.quantum.tensors` over Wang functions of M. The matrix between two J is a Kronecker product, real in the
+with the second factor from `operators.tensors` over Wang functions of M. The matrix between two J is a Kronecker product, real in the
 phases of that module: for an odd rank both factors are i times real, and their product is -1 times real. Light polarized along principal
 axes X, Y, Z does not connect the D2 species of M, nor does a diagonal polarizability those of k: together up to 16 blocks.
 """
@@ -44,9 +44,9 @@ from rotor.quantum.fields.blocks import (
 )
 from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.levels import Levels
+from rotor.quantum.operators.symmetric_top_elements import space_factor
+from rotor.quantum.operators.tensors import BodyTensor, block_elements, body_tensor
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import space_factor
-from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
 from rotor.quantum.wang.basis import wang_blocks
 
 if TYPE_CHECKING:

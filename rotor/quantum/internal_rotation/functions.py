@@ -5,7 +5,7 @@ The species σ = 0 goes to itself under time reversal; its functions are
     |J K t s) = i^J (|J K⟩|K t⟩ + s (-1)^K |J -K⟩|-K t⟩)/√2  (and i more for s = -1),   K > 0,       i^J |J 0⟩|0 t⟩,  s = parity of t,
 
 Operators of rank k that are real in |J K⟩|K t⟩ connect s with s' = s (-1)^(J+J'+k), imaginary ones connect s with -s'. Elements of odd
-rank are stored without their factor i, as in `rotor.quantum.tensors`; all are then real. Other species use |J K⟩|K t⟩.
+rank are stored without their factor i, as in `rotor.quantum.operators.tensors`; all are then real. Other species use |J K⟩|K t⟩.
 
 H is real if ρ and its tensors lie in a plane of two principal axes, y across it; s (-1)^J is then good. The molecule may have this plane
 as a mirror or not: a mirror excludes components of dipoles and spin tensors with an odd number of y, which are the imaginary ones, and

@@ -30,8 +30,8 @@ from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesL
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, levels_table, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
+from rotor.quantum.operators.tensors import BodyTensor, Tensors
 from rotor.quantum.spins.scheme import Fixed, Rotor
-from rotor.quantum.tensors import BodyTensor, Tensors
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
 

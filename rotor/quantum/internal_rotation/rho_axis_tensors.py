@@ -17,8 +17,8 @@ from rotor.arrays import Floats
 from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes
 from rotor.quantum.operators.algebra import Operator, half_anticommutator
 from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
+from rotor.quantum.operators.tensors import cartesian_of, spherical_components
 from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Rotor
-from rotor.quantum.tensors import cartesian_of, spherical_components
 
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 

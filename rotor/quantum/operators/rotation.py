@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Ints
 from rotor.quantum.operators.algebra import UNIT, Factor, Labels, Operator, Shift, Values, diagonal, shift
-from rotor.quantum.symmetric_top_elements import coupling_to
-from rotor.quantum.tensors import spherical_components
+from rotor.quantum.operators.symmetric_top_elements import coupling_to
+from rotor.quantum.operators.tensors import spherical_components
 from rotor.tops.constants.operators import Powers, axis_order
 
 Weight = Callable[[Ints, Ints, Ints, Ints], Values]  # of J', J, K' and K
@@ -115,7 +115,7 @@ def sum_of_powers(operators: Mapping[Powers, float]) -> Operator:
 def body_tensor(components: ArrayLike) -> Operator:
     """⟨J'K'‖T^k‖JK⟩ of a tensor with components T^k_q, q = -k ... k, in the molecule.
 
-    √((2J'+1)(2J+1)) (-1)^(J'-K') (J' k J; -K' q K) T_q with K' = K + q; the phases and the normalisation of `quantum.tensors`.
+    √((2J'+1)(2J+1)) (-1)^(J'-K') (J' k J; -K' q K) T_q with K' = K + q; the phases and the normalisation of `quantum.operators.tensors`.
     """
     parts = np.asarray(components)
     rank = len(parts) // 2

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.operators.tensors import Tensors, rank_of
 from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.scheme import AxialState, Fixed, Rotor
 from rotor.quantum.spins.stack_elements import Pairs, Section, both_signs, rotor_elements
-from rotor.quantum.tensors import Tensors, rank_of
 from rotor.quantum.wang.basis import WangBlock
 
 _REACH, _RISES_OF_K = 2, range(-2, 3)  # largest differences of N and of K that an operator connects

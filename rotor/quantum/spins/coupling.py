@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.wigner import nine_j, six_j
+from rotor.quantum.operators.wigner import nine_j, six_j
 
 
 def patterns(spins: tuple[int, ...], f: int) -> Ints:

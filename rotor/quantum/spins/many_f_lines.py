@@ -25,6 +25,7 @@ from rotor.arrays import Indices, Ints, Workspace, runs_of_similar_size
 from rotor.frozen import dataclass
 from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Connections, Levels, SolvedBlock
+from rotor.quantum.operators.tensors import Tensors, rank_of
 from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.contraction import Contracted, pieces_in_both_orders, tensors_of_stacks
 from rotor.quantum.spins.coupling import ChainOperator
@@ -44,7 +45,6 @@ from rotor.quantum.spins.many_f import (
 from rotor.quantum.spins.pattern_tables import column_tensors, tensors_by_f
 from rotor.quantum.spins.rotor import Piece
 from rotor.quantum.spins.scheme import Cosines, Scheme
-from rotor.quantum.tensors import Tensors, rank_of
 
 # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
 _LIKE, _SMALL, _MOST = 1.5, 24, 1 << 20

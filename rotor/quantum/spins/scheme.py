@@ -40,8 +40,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.operators.tensors import BodyTensor, body_tensor
 from rotor.quantum.spins.coupling import patterns, patterns_of_three, patterns_of_total, recoupling, recoupling_of_three
-from rotor.quantum.tensors import BodyTensor, body_tensor
 from rotor.quantum.wang.basis import SpeciesFactors
 from rotor.tops.constants.operators import Powers
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.wang_functions import BetweenStates, WangFunctions
 from rotor.quantum.operators.algebra import Operator, change_of
+from rotor.quantum.operators.symmetric_top_elements import coupling_to, wang_coupling
+from rotor.quantum.operators.tensors import BodyTensor, folded_places, overlap
 from rotor.quantum.spins.scheme import (
     ByElements,
     BySpecies,
@@ -24,8 +26,6 @@ from rotor.quantum.spins.scheme import (
     factors_with_n,
     tensor_of,
 )
-from rotor.quantum.symmetric_top_elements import coupling_to, wang_coupling
-from rotor.quantum.tensors import BodyTensor, folded_places, overlap
 from rotor.quantum.wang.basis import SPECIES, Part, SpeciesFactors, WangBlock
 from rotor.quantum.wang.wang_matrix import diagonal_elements, unit_diagonals
 

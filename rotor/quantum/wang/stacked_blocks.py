@@ -20,8 +20,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.symmetric_top_elements import wang_coupling
-from rotor.quantum.tensors import BodyTensor
+from rotor.quantum.operators.symmetric_top_elements import wang_coupling
+from rotor.quantum.operators.tensors import BodyTensor
 from rotor.quantum.wang.basis import WangBlock
 
 Sector = tuple[int, int]  # parity of K and sign of a Wang block

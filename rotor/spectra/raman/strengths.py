@@ -3,7 +3,7 @@
 S(i, f) = (3/2) Σ_{M' M p} |⟨f M'|α_2p(space)|i M⟩|²,     Σ_f S(i, f) = (2J+1) γ²,     γ² = (3 Σ α_gh² - (Σ α_gg)²)/2,
 
 including the elastic term f = i, so that S = (2J+1) b γ² with the coefficients b of G. Placzek and E. Teller, Z. Phys. 81,
-209 (1933). The sums over M', M and p give squares of the reduced elements in `quantum.tensors`.
+209 (1933). The sums over M', M and p give squares of the reduced elements in `quantum.operators.tensors`.
 
 The polarizability does not act on spins. Each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... therefore multiplies the
 element by
@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum import reduced
+from rotor.quantum.blocks import reduced
+from rotor.quantum.blocks.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.levels import Levels, SolvedBlock, single_block
-from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
-from rotor.quantum.symmetric_top_elements import coupling
-from rotor.quantum.tensors import body_tensor
+from rotor.quantum.operators.symmetric_top_elements import coupling
+from rotor.quantum.operators.tensors import body_tensor
 from rotor.quantum.wang.basis import wang_blocks
 from rotor.tops.constants.operators import AXIAL_REPRESENTATION, axis_order
 from rotor.tops.spins.spin_weights import SpinWeights

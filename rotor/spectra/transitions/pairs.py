@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices, Ints, Workspace
 from rotor.frozen import dataclass
+from rotor.quantum.blocks.reduced import connections, wang_columns
 from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.reduced import connections, wang_columns
-from rotor.quantum.tensors import body_tensor
+from rotor.quantum.operators.tensors import body_tensor
 from rotor.quantum.wang.stacked_blocks import are_whole
 from rotor.spectra.intensity import IntensityCut
 from rotor.spectra.transitions.strong_lines import strong_lines

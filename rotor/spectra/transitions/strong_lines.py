@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.tensors import BodyTensor
+from rotor.quantum.operators.tensors import BodyTensor
 from rotor.quantum.wang.stacked_blocks import ParityStates, Product, Vector, stacked
 
 SMALLEST_MHZ = 1e-30  # replaces 0 between states of equal energy

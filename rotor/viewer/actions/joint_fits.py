@@ -28,7 +28,7 @@ from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.result import Fit
 from rotor.fitting.search.first_values import beside_zero
 from rotor.fitting.top_constants import ConstantSet
-from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.quantum.labels.labelled import LevelModel, MissingLevelsError
 from rotor.viewer.actions.fits import POOR_RMS, WrongLines, fit_assignments, probably_wrong, refitted
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import FitSummary, Line, Species, State

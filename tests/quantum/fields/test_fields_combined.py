@@ -155,7 +155,7 @@ def test_an_operator_of_one_file_is_fitted():
     from rotor.fitting.assignment import assignments
     from rotor.fitting.fit import fit_lines
     from rotor.fitting.parameters import Parameters
-    from rotor.quantum.label_tracking import labelled_states
+    from rotor.quantum.labels.tracking import labelled_states
 
     top = Top.from_constants("A=10000 B=6000 C=4000 MHz", dipole_abc_debye=tuple(DIPOLE))
     effects = (*SEMI_RIGID, AxisPower(c_mhz=2.0, axis_abc=(0.6, 0.48, 0.64)))

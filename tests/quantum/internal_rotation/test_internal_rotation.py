@@ -228,7 +228,7 @@ def test_strengths_obey_the_sum_rule_over_all_torsional_states():
     low = within & (levels.quanta["vt"] < 6)
     same_level = levels.states * 0.0  # ⟨μ⟩² of a level with itself makes no line
     for block in levels.blocks:
-        from rotor.quantum.tensors import body_tensor
+        from rotor.quantum.operators.tensors import body_tensor
 
         tensors = {(0, 0): body_tensor((2.55, 0.87, 0.0), 1, "Ir")}
         if block.moments.connect(block, block, tensors):

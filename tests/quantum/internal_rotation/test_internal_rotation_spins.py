@@ -8,13 +8,13 @@ import qutip
 from spherical_tensors import spherical, symbol
 
 import rotor
+from rotor.quantum.blocks.reduced import connections
 from rotor.quantum.internal_rotation.hyperfine import coupled_blocks
 from rotor.quantum.internal_rotation.levels import TorsionMoments, species_rotors
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.levels import placed
-from rotor.quantum.reduced import connections
+from rotor.quantum.operators.tensors import BodyTensor, spherical_components
 from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Scheme, Spin, SpinTerm
-from rotor.quantum.tensors import BodyTensor, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM

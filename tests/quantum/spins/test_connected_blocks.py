@@ -12,12 +12,12 @@ from spin_elements import elements_of_parts
 from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
-from rotor.quantum.reduced import connections
+from rotor.quantum.blocks.reduced import connections
+from rotor.quantum.operators.tensors import body_tensor
 from rotor.quantum.spins import Spin, many_f_lines
 from rotor.quantum.spins.coupling import ChainOperator
 from rotor.quantum.spins.pattern_tables import column_tensors, pattern_table
 from rotor.quantum.spins.scheme import Scheme
-from rotor.quantum.tensors import body_tensor
 
 KINDS = ORACLES / "kinds"
 

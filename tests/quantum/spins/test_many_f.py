@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from spin_elements import elements_of_parts
 
+from rotor.quantum.blocks.reduced import connections
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.reduced import connections
+from rotor.quantum.operators.tensors import body_tensor
 from rotor.quantum.spins import many_f, many_f_lines
 from rotor.quantum.spins.levels import levels_of_f
-from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import line_list
 from rotor.spectra.transitions.pairs import all_transitions

@@ -9,10 +9,10 @@ from plain_elements import rotor_elements, tensor_elements
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.operators.rotation import components, direction_cosine, j_squared
+from rotor.quantum.operators.tensors import body_tensor, tensor_between
 from rotor.quantum.spins.contraction import operators_of_stacks, pieces_in_both_orders, stacks_of, tensors_of_stacks
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
 from rotor.quantum.spins.scheme import ByElements, Cosines, CosinesWithN, Scalar
-from rotor.quantum.tensors import body_tensor, tensor_between
 from rotor.tops.constants.constants import Constants
 from rotor.tops.top import Top
 

@@ -25,7 +25,7 @@ from rotor.formats.spcat.hamiltonian.codes import FIXED, FREE_ABOVE, NO_LEADER, 
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remark_notes, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, npar_notes, read_par
-from rotor.quantum.labelled import LevelModel
+from rotor.quantum.labels.labelled import LevelModel
 from rotor.table import counted
 from rotor.tops.constants.constants import AxisOrderError, Constants
 

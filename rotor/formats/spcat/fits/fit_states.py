@@ -45,14 +45,14 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.blocks.connected import connected_parts
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.estimates.effect_units import Functions, assigned_with_spins, unit_levels
-from rotor.quantum.label_tracking import AssignedLevels, TrackedLevels, labelled_states
-from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
+from rotor.quantum.labels.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
+from rotor.quantum.labels.tracking import AssignedLevels, TrackedLevels, labelled_states
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
 
 if TYPE_CHECKING:
-    from rotor.quantum.label_tracking import LevelBlocks
+    from rotor.quantum.labels.tracking import LevelBlocks
 
 
 _SYMMETRIES = 4  # species of the group of twofold rotations; an operator of symmetry s connects t with s ^ t

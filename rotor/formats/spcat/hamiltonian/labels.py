@@ -46,7 +46,7 @@ from rotor.quantum.wang.basis import WangBlock, names_of
 from rotor.tops.constants.operators import Operators
 
 if TYPE_CHECKING:
-    from rotor.quantum.label_tracking import NamedFunctions, Naming
+    from rotor.quantum.labels.tracking import NamedFunctions, Naming
 
 _FIRST_LOOKED_AT = 5  # the diagonal is tested from the last function of a block with K up to this value
 _CLEAR = 0.5  # a larger weight is the largest one of its state and of its function
@@ -196,7 +196,7 @@ def _named_functions(
     functions: Functions, turn: Floats | None, diag: int, oblate: bool, diagonal: Diagonal
 ) -> NamedFunctions:
     """Rule of DIAG; turn: the functions in rows over the basis of the eigenvectors, None where they are this basis."""
-    from rotor.quantum.label_tracking import Follows, NamedFunctions
+    from rotor.quantum.labels.tracking import Follows, NamedFunctions
 
     groups = _groups(functions, diag)
     if turn is not None:

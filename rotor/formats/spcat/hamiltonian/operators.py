@@ -54,8 +54,8 @@ from rotor.quantum.operators.rotation import (
     sum_of_powers,
     with_powers,
 )
+from rotor.quantum.operators.tensors import spherical_components
 from rotor.quantum.spins.scheme import ByElements, Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
-from rotor.quantum.tensors import spherical_components
 from rotor.tops.constants.operators import Operators
 
 

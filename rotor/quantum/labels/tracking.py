@@ -19,7 +19,7 @@ from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateElements, StateTerms, Vertex
 from rotor.quantum.blocks.linear_stacks import LinearBlock, LinearStack, stack_numbers
 from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.labelled import ClosedForm, LevelModel
+from rotor.quantum.labels.labelled import ClosedForm, LevelModel
 from rotor.quantum.wang.basis import WangBlock, blocks_within, parts_of
 from rotor.quantum.wang.coupled_levels import names_of_functions, names_of_states
 from rotor.quantum.wang.rotation import representation_of

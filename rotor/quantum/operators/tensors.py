@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 from rotor.frozen import dataclass
-from rotor.quantum.symmetric_top_elements import coupling, sign_of, wang_coupling
+from rotor.quantum.operators.symmetric_top_elements import coupling, sign_of, wang_coupling
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.constants.operators import axis_order as axis_order
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.wigner import three_j
+from rotor.quantum.operators.wigner import three_j
 
 
 def coupling(j_low: float, j_up: float, rank: int, q: int, k: ArrayLike) -> Floats:

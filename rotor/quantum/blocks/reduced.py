@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.levels import Connections, SolvedBlock
-from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
+from rotor.quantum.operators.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
 
 
 def connections(blocks: Sequence[SolvedBlock], tensors: Tensors) -> Connections:
