@@ -17,12 +17,16 @@ from rotor.formats.spcat.file_model import connected_groups
 
 # the generator, states, spins
 KINDS: list[tuple[Callable[[int, int, int], CodedFile], int, int]] = [
-    *((file_of_series, *size) for size in ((1, 0), (2, 0), (3, 0), (1, 1), (2, 1))),
-    *((file_of_phase, *size) for size in ((1, 0), (2, 0), (3, 0), (1, 1), (2, 1))),
-    *((file_of_ixx, *size) for size in ((1, 1), (2, 1), (1, 2))),
+    *((file_of_series, *size) for size in ((1, 0), (2, 0), (1, 1), (2, 1))),
+    *((file_of_phase, *size) for size in ((1, 0), (2, 0), (1, 1))),
+    *((file_of_ixx, *size) for size in ((1, 1), (2, 1))),
     *((file_of_equivalent, *size) for size in ((1, 2), (2, 2))),
 ]
 LARGER = [
+    (file_of_series, 3, 0),
+    (file_of_phase, 3, 0),
+    (file_of_phase, 2, 1),
+    (file_of_ixx, 1, 2),
     (file_of_series, 2, 2),
     (file_of_series, 3, 1),
     (file_of_phase, 2, 2),
