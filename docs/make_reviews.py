@@ -27,6 +27,11 @@ from rotor import cli
 HERE = Path(__file__).parent
 ITEMS = HERE / "validation" / "reviews.toml"
 TARGET = ITEMS.with_suffix(".md")
+ROUND_OFF = 1e-6  # standard errors
+STEP, BOUNDED = (
+    r"the next step would be (\S+) standard errors",
+    f"the next step would be below {ROUND_OFF:g} standard errors",
+)
 INTRODUCTION = """# What reviews of the second release found
 
 Six reviews ran the second release on inputs that nobody here had seen. Each item has the command that was wrong, what it prints now (lines
@@ -68,9 +73,13 @@ def printed(command: str) -> str:
 
 
 def _shown(line: str, columns: int | None) -> str:
-    """A line of output without seconds and keys of points, cut after so many columns."""
+    """A line of output without seconds and keys of points, cut to the whole values within so many columns.
+
+    The step that would follow a finished fit is round-off, shown as a bound.
+    """
     line = re.sub(r"^[0-9a-f]{16}(?=,)", "KEY", re.sub(r"in [0-9.]+ s\b", "in ... s", line.rstrip()))
-    return line if columns is None or len(line) <= columns else line[:columns] + " ..."
+    line = re.sub(STEP, lambda step: BOUNDED if float(step[1]) < ROUND_OFF else step[0], line)
+    return line if columns is None or len(line) <= columns else re.sub(r"[^,\s]*$", "", line[:columns]) + " ..."
 
 
 def transcript(shown: dict[str, Any]) -> list[str]:

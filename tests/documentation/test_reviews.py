@@ -78,3 +78,12 @@ def test_another_number_is_seen():
     assert not same("lines 233, from 1.7428 MHz", "lines 234, from 1.7428 MHz")
     assert not same("lines 233, from 1.7428 MHz", "lines 233, from 1.7429 MHz")
     assert not same("note: left out", "note: kept")
+
+
+def test_round_off_does_not_change_the_page():
+    """The last bits of a sum differ between machines: a step of round-off is a bound, and a line is cut between values."""
+    steps = [f"converged: the next step would be {size} standard errors" for size in ("2.1e-07", "2.6e-07", "0.012")]
+    bounded = "converged: the next step would be below 1e-06 standard errors"
+    assert [MAKE._shown(text, None) for text in steps] == [bounded, bounded, steps[2]]
+    values = ("1 1,-987.1147471466119,-15.889,0.284", "1 1,-987.114747146612,-15.889,0.284")
+    assert [MAKE._shown(text, 28) for text in values] == [f"{text[: text.index('-15')]} ..." for text in values]
