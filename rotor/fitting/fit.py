@@ -9,6 +9,7 @@ describes the lines; a weighted rms far above 1 is reported as a failure.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -30,6 +31,7 @@ from rotor.requests.budget import ROUNDING
 from rotor.statistics.least_squares import EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
 from rotor.table import counted
+from rotor.tops.constants.constants import AxisOrderError
 
 NEARLY_THERE = 0.01  # convergence limit (standard errors of the next step) at the last allowed iteration
 CHANGED_STATE = 0.5  # overlap with the state at the start below which a level is reported as changed
@@ -201,8 +203,21 @@ def _constants(
     chosen = {name: value for name, value in constants.uncertainties.items() if name not in new}
     try:
         return constants.replace(**new, uncertainties={**chosen, **errors}), ""
+    except AxisOrderError as error:
+        return constants, f"{error.constants}: they left the order {error.order}{_held_barrier(parameters)}"
     except ValueError as error:
         return constants, str(error)
+
+
+def _held_barrier(parameters: Parameters) -> str:
+    """Constants of an internal rotor that were held and may have made rotational constants cross, with the remedy; empty without any."""
+    moves = parameters.matrix.any(axis=1)
+    held = [name for name, free in zip(parameters.constant_names, moves, strict=True) if not free]
+    rotor = [name for name in held if re.fullmatch(r"(V3|rho|F0?)(_\d)?", name)]
+    if not rotor:
+        return ""
+    remedy = ",".join([name for name in rotor if name.startswith("V3")] or rotor)
+    return f"; {', '.join(rotor)} held at a wrong value can make rotational constants cross: free {remedy}"
 
 
 def _line_errors(search: Search) -> Floats:

@@ -166,3 +166,40 @@ def test_constants_of_principal_axes_are_found_again(epsilon, free):
     expected = dict(true.constants.values) | dict(true.internal_rotation.values)
     for name, value in zip(fit.parameters.names, fit.values, strict=True):
         assert value == pytest.approx(expected[name], rel=1e-7)  # lines without noise
+
+
+def acetaldehyde_like(barrier_cm):
+    values = {"F0": 158e3, "delta": 0.56, "V3": barrier_cm * CM}
+    return rotor.Top.from_constants(
+        {"A": 56508.0, "B": 10454.0, "C": 9089.0},
+        internal_rotation=InternalRotationConstants(values, frame="PAM", vt_max=0),
+    )
+
+
+def rotational_lines(top, jmax):
+    """Some ΔJ = 1 lines of A and E without errors."""
+    levels = rotor.levels(top, jmax=jmax).table.levels
+    quanta = [np.asarray(levels.quanta[name]) for name in NAMES]
+    labels = np.column_stack(
+        [(q == "E").astype(int) if name == "species" else q for name, q in zip(NAMES, quanta, strict=True)]
+    )
+    energy, j, (ka, kc, species) = np.asarray(levels.energy_mhz), labels[:, 0], labels[:, 1:4].T
+    step = energy[:, None] - energy
+    chosen = (step > 0) & (step < 4e5) & (np.abs(j[:, None] - j) == 1) & (species[:, None] == species)
+    chosen &= (np.abs(ka[:, None] - ka) <= 1) & ((ka + kc)[:, None] % 2 != (ka + kc) % 2)
+    upper, lower = np.nonzero(chosen)
+    return assignments(NAMES, labels[upper], labels[lower], step[upper, lower], np.full(len(upper), 0.02))
+
+
+def test_a_barrier_held_at_a_wrong_value_is_named_where_constants_cross():
+    """The fit ended in "the names follow the order A >= B >= C; exchange them", though the names were right."""
+    lines = rotational_lines(acetaldehyde_like(400.0), 4)
+    start = TopConstants(acetaldehyde_like(300.0))
+    held = fit_lines(lines, start, parameters(start, ["A", "B", "C"]))
+    assert not held.converged
+    assert "they left the order A >= B >= C; F0, V3 held at a wrong value" in held.reason
+    assert held.reason.endswith("can make rotational constants cross: free V3")
+    assert "exchange" not in held.reason
+    freed = fit_lines(lines, start, parameters(start, ["A", "B", "C", "V3"]))
+    assert freed.converged
+    assert freed.constants.values["V3"] == pytest.approx(400.0 * CM, rel=1e-6)

@@ -387,11 +387,11 @@ def _spread(name: str, value: float | str) -> float:
 
 
 class AxisOrderError(ValueError):
-    """Rotational constants whose names are not in the order of their values. constants: their text."""
+    """Rotational constants whose names are not in the order of their values. constants: their text; order: of the names."""
 
     def __init__(self, constants: str, names: Sequence[str]) -> None:
-        super().__init__(f"{constants}: the names follow the order {' >= '.join(names)}; exchange them")
-        self.constants = constants
+        self.constants, self.order = constants, " >= ".join(names)
+        super().__init__(f"{constants}: the names follow the order {self.order}; exchange them")
 
 
 def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
