@@ -198,15 +198,45 @@ def turning():
 
 
 def test_a_stark_map_of_a_methyl_group_has_short_names_and_all_m(turning):
-    """Eight levels share a name within the picture; M of E has both signs and is not mixed."""
-    figure = rotor.plot(rotor.stark(turning, fields_kv_per_cm="0:4kV/cm:3", j_highest=1))
+    """Levels of the same height share a name within the picture; M of E has both signs and is not mixed."""
+    from rotor.plots.view import View
+
+    figure = rotor.plot(
+        rotor.stark(turning, fields_kv_per_cm="0:4kV/cm:3", j_highest=1), view=View(vertical=(0.0, 1000.0))
+    )
     figure.canvas.draw()  # a warning where the layout fails is an error
     axes = figure.axes[0]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["|M| = 0", "|M| = 1"]
     names = [text.get_text() for text in axes.texts]
-    assert any(name.endswith(" (8)") and " … " in name for name in names)
+    assert any(name.endswith(")") and " … " in name for name in names)
     assert axes.bbox.width > 0.8 * figure.bbox.width
     assert all(text.get_window_extent().x0 > 0 for text in axes.texts)
+
+
+def test_torsional_states_in_a_field_have_a_panel_each(turning):
+    """Levels of v_t = 0 and 1 are 100 cm⁻¹ apart or more: on one axis all of them looked flat."""
+    from dataclasses import replace
+
+    from rotor.plots.view import View
+
+    two = replace(turning, internal_rotation=replace(turning.internal_rotation, vt_max=1))
+    result = rotor.stark(two, fields_kv_per_cm="0:4kV/cm:3", j_highest=1)
+    figure = rotor.plot(result)
+    figure.canvas.draw()
+    *states, slopes = figure.axes
+    names = ["".join(text.get_text() for text in axes.texts) for axes in states]
+    assert ["v_t{=}1" in text for text in names] == [True, False]  # the upper state above
+    assert ["v_t{=}0" in text for text in names] == [False, True]
+    assert all(np.ptp(axes.get_ylim()) < 10 for axes in states)
+    assert sum(len(axes.lines) for axes in states) >= len(slopes.lines) - 1  # every curve, and the line at zero
+    assert all(text.get_window_extent().x0 > 0 for axes in states for text in axes.texts)
+    assert len(rotor.plot(result, view=View(vertical=(0.0, 500.0))).axes) == 2
+
+
+def test_levels_of_a_methyl_group_are_named_by_species(turning):
+    """The legend had "mean spin weight 0.5" for E."""
+    figure = rotor.plot(rotor.levels(turning, jmax=3))
+    assert [text.get_text() for legend in figure.legends for text in legend.get_texts()] == ["species A", "species E"]
 
 
 def test_the_result_of_a_verb_is_drawn_as_by_its_method():

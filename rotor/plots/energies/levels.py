@@ -145,6 +145,8 @@ def _species(table: SelectedLevels, top: Top | None) -> list[_Species]:
     rule = "" if top is None else top.spin_weights.rule
     if top is not None and rule == "K" and "k" in table.levels.quanta:
         return [*_by_k(np.abs(table.levels.quanta["k"][table.rows]), weight > 0, top.spin_weights), missing]
+    if len(torsional := _by_torsional_species(table, weight > 0)) > 1:
+        return [*torsional, missing]
     weights = np.unique(weight[weight > 0])
     if not 2 <= len(weights) <= MOST_WEIGHTS:
         return [_Species(weight > 0, BLUE, "-", "existing" if missing.rows.any() else ""), missing]
@@ -154,6 +156,20 @@ def _species(table: SelectedLevels, top: Top | None) -> list[_Species]:
     return [
         *(_Species(weight == w, colour, "-", f"{word}{mean}spin weight {w:.4g}") for w, colour, word, mean in kinds),
         missing,
+    ]
+
+
+def _by_torsional_species(table: SelectedLevels, exists: NDArray[np.bool_]) -> list[_Species]:
+    """Groups of levels by species of internal rotation, A and E of a methyl group; none where there are more than colours."""
+    if "species" not in table.levels.quanta:
+        return []
+    species = np.asarray(table.levels.quanta["species"])[table.rows]
+    names = list(dict.fromkeys(species[exists].tolist()))
+    if len(names) > len(PALETTE):
+        return []
+    return [
+        _Species(exists & (species == name), colour, "-", f"species {name}")
+        for name, colour in zip(names, PALETTE, strict=False)
     ]
 
 

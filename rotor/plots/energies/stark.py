@@ -19,7 +19,11 @@ from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
 NARROW_INCHES = 5.0
-SIZE_INCHES = (WIDTH_INCHES, 6.0)
+HEIGHT, HEIGHT_OF_STATE, HEIGHT_OF_SLOPES = (
+    4.1,
+    3.0,
+    1.9,
+)  # inches, of one panel of energies, of each of several, and of slopes
 LEAST_DRAWN = 1e-4  # relative to the strongest line
 MOST_LABELS = 27  # on the axis of energies; a name takes 1/27 of its height
 MOST_CHARACTERS = 40  # of names that share a place
@@ -56,12 +60,41 @@ def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm", view
     if len(field_map.fields) < 2:
         raise ValueError("a picture of a map needs two fields or more")
     with styled():
-        figure = new_figure(SIZE_INCHES)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.4))
-        _energies(above, field_map, view)
+        groups = _by_torsional_state(field_map, _curves(field_map, view), view)
+        height = HEIGHT if len(groups) == 1 else HEIGHT_OF_STATE
+        heights = [*[height] * len(groups), HEIGHT_OF_SLOPES]
+        figure = new_figure((WIDTH_INCHES, sum(heights)))
+        *panels, below = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+        ends = [_energies(axes, field_map, curves, view) for axes, curves in zip(panels, reversed(groups), strict=True)]
         _slopes(below, field_map, unit, view)
-        above.set_title(title, loc="left")
+        panels[0].set_title(title, loc="left")
+        _legend(panels[0], _projections(field_map))
+        shown = field_map.field[_curves(field_map, view)[0]]
+        fields = (float(shown[0]), float(shown[-1]))
+        most = int(MOST_LABELS * height / HEIGHT)
+        shares = [_labels(axes, fields, named, most) for axes, named in zip(panels, ends, strict=True)]
+        _limit_axis(below, fields, max(shares))
     return figure
+
+
+def _by_torsional_state(field_map: FieldMap, curves: list[Ints], view: View) -> list[list[Ints]]:
+    """Curves in groups of one torsional state, which lie far apart; together where the view sets the energies, or beyond four states."""
+    levels = field_map.request.space(field_map.jmax).levels
+    if "vt" not in levels.quanta or view.vertical is not None:
+        return [curves]
+    states: dict[str, list[Ints]] = {}
+    for rows in curves:
+        states.setdefault(_quanta(field_map, rows)["vt"], []).append(rows)
+    groups = [states[vt] for vt in sorted(states, key=int)]
+    return groups if len(groups) <= MOST_PANELS else [curves]
+
+
+def _quanta(field_map: FieldMap, rows: Ints) -> dict[str, str]:
+    """The quantum numbers of a curve as texts, in the order of labels."""
+    levels = field_map.request.space(field_map.jmax).levels
+    first = [name for name in BEFORE_J if name in levels.quanta]
+    names = [*first, "j", *(name for name in levels.quanta if name not in first)]
+    return dict(zip(names, str(field_map.label[rows[0]]).split(), strict=True))
 
 
 def picture(
@@ -76,31 +109,29 @@ def picture(
     return Picture(stark_figure(thing, title, view=view, **options), title, thing.provenance)
 
 
-def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
-    seen: set[float] = set()
-    ends: list[tuple[float, str]] = []
-    levels = field_map.request.space(field_map.jmax).levels
+def _energies(axes: Any, field_map: FieldMap, curves: list[Ints], view: View) -> list[tuple[float, str]]:
+    """Draw energies against field; the energies at the first field with their names."""
     projections = _projections(field_map)
-    first = [name for name in BEFORE_J if name in levels.quanta]
-    names = [*first, "j", *(name for name in levels.quanta if name not in first)]  # in the order of labels
-    for rows in _curves(field_map, view):
-        m = float(projections[rows[0]])
+    ends: list[tuple[float, str]] = []
+    for rows in curves:
         energies = field_map.energy_mhz[rows] / MHZ_PER_CM
-        label = None if m in seen else ("M mixed" if m < 0 else f"|M| = {m:g}")
-        axes.plot(field_map.field[rows], energies, color=_colour(m), linewidth=0.9, label=label)
-        seen.add(m)
-        ends.append(
-            (float(energies[0]), as_mathtext(dict(zip(names, str(field_map.label[rows[0]]).split(), strict=True))))
-        )
+        axes.plot(field_map.field[rows], energies, color=_colour(float(projections[rows[0]])), linewidth=0.9)
+        ends.append((float(energies[0]), as_mathtext(_quanta(field_map, rows))))
     show_part(axes, replace(view, horizontal=None))
-    fields = field_map.field[_curves(field_map, view)[0]]
-    _labels(axes, (float(fields[0]), float(fields[-1])), ends)
     axes.set_ylabel("Energy (cm⁻¹)")
-    if seen != {-1}:
-        if axes.figure.get_figwidth() < NARROW_INCHES:  # the title needs the width beside it
-            axes.figure.legend(fontsize=9, loc="outside upper right", ncols=len(seen))
-        else:
-            axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
+    return ends
+
+
+def _legend(axes: Any, projections: Floats) -> None:
+    """A legend of |M|, none where M is mixed."""
+    values = sorted({float(m) for m in projections if m >= 0})
+    handles = [axes.plot([], [], color=_colour(m), linewidth=0.9, label=f"|M| = {m:g}")[0] for m in values]
+    if handles and axes.figure.get_figwidth() < NARROW_INCHES:  # the title needs the width beside it
+        axes.figure.legend(handles=handles, fontsize=9, loc="outside upper right", ncols=len(handles))
+    elif handles:
+        axes.legend(
+            handles=handles, frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(handles)
+        )
 
 
 def _projections(field_map: FieldMap) -> Floats:
@@ -124,12 +155,15 @@ def _colour(m: float) -> str:
     return PALETTE[int(m) % len(PALETTE)] if m >= 0 else PALETTE[0]
 
 
-def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]]) -> None:
-    """Write the names of all free levels at the left, moved apart where they would overlap; thin lines lead to the levels."""
+def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]], most: int) -> float:
+    """Write the names of all free levels at the left, moved apart where they would overlap; thin lines lead to the levels.
+
+    most: names that the panel has space for. Returns the part of the width that they take.
+    """
     low, high = axes.get_ylim()
     first, end = fields
-    height = (high - low) / MOST_LABELS
-    named = _grouped(sorted({(energy, label) for energy, label in ends if low <= energy <= high}), height)
+    height = (high - low) / most
+    named = _grouped(sorted({(energy, label) for energy, label in ends if low <= energy <= high}), height, most)
     places = _apart(np.array([energy for energy, _ in named]), height, low, high - height / 2)
     axes.set_xlim(first - 0.045 * (end - first), end + 0.02 * (end - first))
     texts = [
@@ -142,18 +176,22 @@ def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]
         for (energy, label), place in zip(named, places.tolist(), strict=True)
     ]  # fmt: skip
     axes.figure.canvas.draw()  # computes the layout, so that pixel sizes are valid
-    share = min(
-        max((text.get_bbox_patch() or text).get_window_extent().width for text in texts) / axes.bbox.width, WIDEST
-    )
+    widest = max((text.get_bbox_patch() or text).get_window_extent().width for text in texts)
+    return min(float(widest / axes.bbox.width), WIDEST)
+
+
+def _limit_axis(axes: Any, fields: tuple[float, float], share: float) -> None:
+    """Leave a part of the width of all panels to the names at their left."""
+    first, end = fields
     axes.set_xticks([tick for tick in axes.get_xticks() if first <= tick <= end])
     end += 0.02 * (end - first)
     axes.set_xlim((first - 0.04 * (end - first) - share * end) / (1.0 - share), end)  # a name keeps its width in pixels
 
 
-def _grouped(levels: list[tuple[float, str]], height: float) -> list[tuple[float, str]]:
+def _grouped(levels: list[tuple[float, str]], height: float, most: int) -> list[tuple[float, str]]:
     """Energies with their names; the nearest levels share a name until all names have space."""
     groups = [([energy], [label]) for energy, label in levels]
-    while len(groups) > MOST_LABELS or (len(groups) > 1 and min(_gaps(groups)) < SAME_HEIGHT * height):
+    while len(groups) > most or (len(groups) > 1 and min(_gaps(groups)) < SAME_HEIGHT * height):
         near = int(np.argmin(_gaps(groups)))
         energies, labels = groups.pop(near + 1)
         groups[near] = (groups[near][0] + energies, groups[near][1] + labels)
