@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Facts, Part, listed
-from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.budget import ErrorBudget, ErrorTerm, size_text
 from rotor.tops.components import known_dipole
 from rotor.tops.facts import top_formula
 
@@ -97,7 +97,9 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     from rotor.quantum.estimates.limits import Limit
     from rotor.requests.plan import left_out_texts
 
-    present = [f"{effect['name']} {effect['size_mhz']:.2g} MHz" for effect in content["effects"] if effect["present"]]
+    present = [
+        f"{effect['name']} {size_text(effect['size_mhz'], 'MHz')}" for effect in content["effects"] if effect["present"]
+    ]
     sizes = (
         f"at J = {content['sizes_at_j']}: " + ", ".join(present) if present else "those of the parameters of the files"
     )
@@ -269,7 +271,7 @@ def error_rows(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     budget = ErrorBudget.from_json(content)
     rows = [(name, _error_text(term, budget.unit, ERROR_KINDS[name])) for name, term in budget.terms.items()]
     total = budget.total
-    return [*rows, ("total", "no: a term is not estimated" if total is None else f"{total:.2g} {budget.unit}".rstrip())]
+    return [*rows, ("total", "no: a term is not estimated" if total is None else size_text(total, budget.unit))]
 
 
 def _error_text(term: ErrorTerm, unit: str, kind: str) -> str:
@@ -278,4 +280,4 @@ def _error_text(term: ErrorTerm, unit: str, kind: str) -> str:
     if not term.value:
         return f"{'exact' if kind == 'bound' else 'none'} ({term.source})"
     remedy = f"; {term.remedy} would lower it" if term.remedy else ""
-    return f"{term.value:.2g} {unit}".rstrip() + f", {kind}: {term.source}{remedy}"
+    return size_text(term.value, unit) + f", {kind}: {term.source}{remedy}"

@@ -32,6 +32,19 @@ def two_digits(value: float) -> str:
     return f"{float(f'{value:.2g}'):g}"
 
 
+def size_text(value: float, unit: str) -> str:
+    """An estimated size with its unit: two digits, in GHz or THz from 1000 MHz on.
+
+    >>> size_text(10.0, "MHz"), size_text(995.0, "MHz"), size_text(170432.0, "MHz"), size_text(3.7e7, "MHz"), size_text(1234.0, "K")
+    ('10 MHz', '1 GHz', '170 GHz', '37 THz', '1200 K')
+    """
+    value = float(f"{value:.2g}")
+    for larger in ("GHz", "THz"):
+        if unit in ("MHz", "GHz") and value >= 1e3:
+            value, unit = value / 1e3, larger
+    return f"{two_digits(value)} {unit}".rstrip()
+
+
 @dataclass(frozen=True)
 class ErrorTerm:
     """One source of error of a result.
@@ -58,7 +71,7 @@ class ErrorTerm:
         """Value, unit and source as on the screen."""
         if self.value is None:
             return f"{NOT_ESTIMATED}: {self.source}"
-        number = "exact" if self.value == 0 else f"{two_digits(self.value)} {unit}".rstrip()
+        number = "exact" if self.value == 0 else size_text(self.value, unit)
         return f"{number} ({self.source})"
 
     def as_json(self, unit: str) -> dict[str, Any]:
@@ -155,7 +168,7 @@ class ErrorBudget:
         for name, term in self.shown():
             if term.value is None or term.value <= accuracy:
                 continue
-            size = f"{'about ' if name == 'left out' else ''}{two_digits(term.value)} {self.unit}".rstrip()
+            size = f"{'about ' if name == 'left out' else ''}{size_text(term.value, self.unit)}"
             remedy = f"; {term.remedy} would lower it" if term.remedy else ""
             parts.append(f"{name} {size} is larger ({term.source}){remedy}")
         return "; ".join(parts)

@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from rotor.frozen import dataclass
+from rotor.requests.budget import size_text
 
 LONG_SEARCH = 10.0  # seconds; a shorter search is repeated, since its first run includes imports and compilation
 T = TypeVar("T")
@@ -33,7 +34,7 @@ class LeftOut:
     basis: str
 
     def __str__(self) -> str:
-        size = "not estimated" if self.size is None else f"about {self.size:.1g} {self.unit}"
+        size = "not estimated" if self.size is None else f"about {size_text(self.size, self.unit)}"
         return f"{self.name}: {size}; {self.basis}"
 
 

@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING
 
 from rotor import units
+from rotor.requests.budget import size_text
 from rotor.requests.plan import LeftOut
 
 if TYPE_CHECKING:
@@ -57,7 +58,9 @@ def pressure_width(top: Top, temperature_k: float, pressure_bar: float | None) -
     area = math.pi * COLLISION_M**2 + math.pi * dipole2 / (2 * HBAR_J_S * speed)
     width = 2 * density * speed * area / (2 * math.pi) / 1e6
     if pressure_bar is None:
-        basis = f"no pressure is given; {width:.2g} MHz for each mbar of these molecules at {temperature_k:g} K"
+        basis = (
+            f"no pressure is given; {size_text(width, 'MHz')} for each mbar of these molecules at {temperature_k:g} K"
+        )
         return LeftOut("pressure width", None, "MHz", basis)
     basis = f"full width at half maximum at {1e3 * pressure_bar:g} mbar of these molecules, {temperature_k:g} K"
     return LeftOut("pressure width", width, "MHz", basis)

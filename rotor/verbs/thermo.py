@@ -9,6 +9,7 @@ from typing import Any
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Table, record_table, sampled
+from rotor.requests.budget import size_text
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics.functions import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
@@ -62,7 +63,7 @@ def _spin_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
     """Number of spin functions in Q, and the temperature up to which their splittings are summed."""
     if used is None:
         return []
-    up_to, size = used["summed_up_to_k"], f"splittings of {used['splitting_mhz']:.2g} MHz"
+    up_to, size = used["summed_up_to_k"], f"splittings of {size_text(used['splitting_mhz'], 'MHz')}"
     where = "too small to change them" if up_to is None else f"summed level by level up to {up_to:g} K"
     return [("hyperfine", f"Q counts {used['spin_functions']:.6g} functions of the spins; {size}, {where}")]
 

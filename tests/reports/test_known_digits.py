@@ -57,7 +57,7 @@ def test_isotopologues_have_the_error_of_scaling(call):
     assert top.estimated_errors_mhz["B"] == pytest.approx(2e-4 * top.constants["B"], rel=1e-12)
     assert rotor.read("water").estimated_errors_mhz == {}
     words = call("info", "water", "--isotope", "2=2H")[1].split()
-    assert "errors of rotational constants: data 5600 MHz (scaling from another isotopologue)" in " ".join(words)
+    assert "errors of rotational constants: data 5.6 GHz (scaling from another isotopologue)" in " ".join(words)
 
 
 def test_measured_constants_keep_their_digits(call):

@@ -18,7 +18,7 @@ from rotor.quantum.estimates.budgets import model_term
 from rotor.quantum.estimates.limits import Limit
 from rotor.quantum.estimates.splittings import line_components
 from rotor.quantum.request import LevelsRequest, answer_levels
-from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm, size_text
 from rotor.spectra.emission.budget import steepness
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
@@ -121,7 +121,7 @@ def test_an_accuracy_is_compared_with_the_whole_budget(call, folder):
     assert "reached" not in text
     assert text.startswith("accuracy 0.001 MHz: numerical error at most")
     assert "left out about" in text
-    assert "data 1600 MHz is larger (estimated constants: estimated errors of A, B, C" in text
+    assert "data 1.6 GHz is larger (estimated constants: estimated errors of A, B, C" in text
     assert text.endswith("measured constants would lower it")
 
 
@@ -189,7 +189,7 @@ def test_the_error_of_an_estimated_dipole_is_that_of_the_energies():
     moved = np.abs(energies(1.001).states.energy_mhz - energies(0.999).states.energy_mhz).max() / 0.002
     sigma = moved * ESTIMATED_DIPOLE_D / math.hypot(1.0, 0.5)
     assert answer.errors.data.value is None  # the constants have no uncertainties
-    assert f"{sigma:.2g} MHz" in answer.errors.data.source
+    assert size_text(sigma, "MHz") in answer.errors.data.source
 
 
 def test_maps_state_their_bounds_and_the_unknown_moments():

@@ -24,6 +24,7 @@ from rotor.geometry.rotations import distance
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.plans import stray_field
 from rotor.quantum.solve import solve_levels
+from rotor.requests.budget import size_text
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import make_scene, read_scene
@@ -51,7 +52,7 @@ def test_widths_are_those_of_the_conditions_of_the_scene():
     """Without a pressure no width is claimed; Doppler's is that inside the range."""
     alone = pressure_width(rotor.read("OCS"), 2.0, None)
     assert alone.size is None
-    assert f"{pressure_width(rotor.read('OCS'), 2.0, 1e-3).size:.2g} MHz for each mbar" in alone.basis
+    assert f"{size_text(pressure_width(rotor.read('OCS'), 2.0, 1e-3).size, 'MHz')} for each mbar" in alone.basis
     scene = make_scene("spectrum", molecule="H2CO", conditions={"temperature": "30 K", "range": "100:105GHz"})
     widths = {neglected.name: neglected for neglected in plan_of(scene).left_out}
     assert "at 105000 MHz" in widths["Doppler width"].basis

@@ -17,7 +17,7 @@ from rotor.arrays import Floats
 from rotor.quantum.effects.watson import order_of_constant, to_order
 from rotor.quantum.estimates.plans import describe_levels
 from rotor.quantum.levels import energies_like
-from rotor.requests.budget import ErrorTerm
+from rotor.requests.budget import ErrorTerm, size_text
 from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics, numerical_error
 from rotor.requests.plan import Growth
@@ -67,7 +67,7 @@ def _treatments(sought: Sought) -> Iterator[Treatment]:
 
 
 def _treatment_text(sought: Sought, treatment: Treatment) -> str:
-    size = f"{sought.known['size']:.2g} MHz"
+    size = size_text(sought.known["size"], "MHz")
     if treatment == LEFT_OUT:
         return f"spins of nuclei left out, {size}"
     if treatment.tolerance_mhz:

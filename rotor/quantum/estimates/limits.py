@@ -36,7 +36,7 @@ from rotor.arrays import Ints
 from rotor.frozen import dataclass
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
 from rotor.quantum.estimates.splittings import Splitting, splitting_nuclei
-from rotor.requests.budget import two_digits
+from rotor.requests.budget import size_text
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -78,7 +78,7 @@ class Limit:
 
     def sentence(self, with_spins: str = COMPUTE) -> str:
         """Name, size and consequence, as reports print them. with_spins: how the effects of spins are added."""
-        estimate = "not estimated" if self.size_mhz is None else f"about {two_digits(self.size_mhz)} MHz"
+        estimate = "not estimated" if self.size_mhz is None else f"about {size_text(self.size_mhz, 'MHz')}"
         size = f"at most {estimate}" if self.at_most else estimate
         return f"{self.name}: {size}; {self.text.replace(COMPUTE, with_spins)}"
 
@@ -142,7 +142,7 @@ def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> Limit | No
         return None
     (_, before), (order, last) = sizes[-2:]
     which = "higher" if order > 4 else "linear" if top.kind == "linear" else "other"
-    text = f"{FACTORS[which]:g} times the order J^{order} ({last:.2g} MHz) squared over the order before"
+    text = f"{FACTORS[which]:g} times the order J^{order} ({size_text(last, 'MHz')}) squared over the order before"
     levels = f"J = {j}" if top.kind == "linear" else f"J = {j}, K up to {j}"
     return Limit(
         f"centrifugal distortion of order J^{order + 2}", FACTORS[which] * last**2 / before, text, levels=levels

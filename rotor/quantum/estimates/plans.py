@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor import units
+from rotor.requests.budget import size_text
 from rotor.requests.plan import Cost, LeftOut, largest_first
 
 if TYPE_CHECKING:
@@ -111,7 +112,9 @@ def effect_texts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[st
     """Name and size of each effect."""
     from rotor.quantum.effect import effect_sizes
 
-    return tuple(f"{effect.name}, {effect.size_mhz:.2g} MHz at J = {j}" for effect in effect_sizes(top, j, effects))
+    return tuple(
+        f"{effect.name}, {size_text(effect.size_mhz, 'MHz')} at J = {j}" for effect in effect_sizes(top, j, effects)
+    )
 
 
 def torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -> list[tuple[str, str]]:

@@ -25,7 +25,7 @@ from rotor.quantum.estimates.budgets import (
 from rotor.quantum.estimates.limits import Limit, all_limits, limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.solve import solve_levels
-from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.budget import ErrorBudget, ErrorTerm, size_text
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 
@@ -122,7 +122,7 @@ def joined_data(*terms: ErrorTerm) -> ErrorTerm:
     """
     estimated = sorted((term for term in terms if term.value), key=lambda term: -(term.value or 0.0))
     if not_estimated := [term.source for term in terms if term.value is None]:
-        sizes = [f"{term.source} {term.value:.2g} MHz" for term in estimated]
+        sizes = [f"{term.source} {size_text(term.value, 'MHz')}" for term in estimated]
         return ErrorTerm(None, "; ".join([*not_estimated, *sizes]))
     if not estimated:
         return ErrorTerm(0.0, "; ".join(term.source for term in terms) or NO_UNCERTAINTIES)

@@ -24,7 +24,7 @@ from rotor import units
 from rotor.quantum.estimates.budgets import NO_SAMPLES, model_term
 from rotor.quantum.estimates.limits import ELECTRON_SPIN, ESTIMATED, QUADRUPOLE, Limit, all_limits
 from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
-from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm, size_text
 from rotor.spectra.emission.emission import KM_PER_S, contrast_k
 from rotor.spectra.emission.emitters import CatalogueLines
 
@@ -107,7 +107,7 @@ def _shifted(term: ErrorTerm, per_mhz: float, brightness: float) -> ErrorTerm:
     """Error of T_B from shifts in MHz, at most the whole line."""
     if term.value is None:
         return term
-    text = f"lines shifted by {term.value:.2g} MHz: {term.source}"
+    text = f"lines shifted by {size_text(term.value, 'MHz')}: {term.source}"
     # an error cannot exceed the brightness
     return ErrorTerm(min(term.value * per_mhz, brightness), text, term.remedy)
 

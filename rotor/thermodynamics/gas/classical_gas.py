@@ -21,7 +21,7 @@ from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import SPIN_LIMITS, model_limits, model_sizes
-from rotor.requests.budget import ErrorBudget
+from rotor.requests.budget import ErrorBudget, size_text
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.statistics.degrees_of_freedom import count_degrees
@@ -123,7 +123,7 @@ class GasAnswer(TextOf):
         sizes = [
             size for size in model_sizes(top, j, effects) if size.present and size.name == "centrifugal distortion"
         ]
-        distortion = [f"{size.name}: {size.size_mhz:.2g} MHz of a level at J = {j}" for size in sizes]
+        distortion = [f"{size.name}: {size_text(size.size_mhz, 'MHz')} of a level at J = {j}" for size in sizes]
         seen = [limit.sentence() for limit in model_limits(top, j, effects) if limit.name not in SPIN_LIMITS]
         return [f"collisions; vibrations; {quantum}", *distortion, *seen]
 
