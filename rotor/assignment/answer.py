@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.assignment.peaks.doublets import WIDEST_MHZ, look_split, split_lines
 from rotor.assignment.peaks.progressions import Progression, progressions
 from rotor.assignment.request import AssignRequest
 from rotor.assignment.search.rigid_table import PARAMETERS, TYPES
@@ -166,6 +167,23 @@ class AssignAnswer(TextOf):
     def progressions(self) -> tuple[Progression, ...]:
         """Linear and symmetric tops whose lines are among the unexplained peaks."""
         return tuple(progressions(self.request.peaks, self.unexplained))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A remark on each species whose lines look split, though it was assigned without doublets."""
+        return tuple(filter(None, map(self._note_on_splittings, range(1, len(self.species) + 1))))
+
+    def _note_on_splittings(self, number: int) -> str:
+        species = self.species[number - 1]
+        near, expected = split_lines(self.request.peaks, species.peak.ravel(), self.unexplained)
+        if species.split or not look_split(near, expected):
+            return ""
+        lines = len(np.unique(species.peak))
+        return (
+            f"species {number}: {near} of its {lines} peaks have an unassigned peak of similar height within {WIDEST_MHZ:g} MHz "
+            f"(by chance {expected:.1g}): lines look split, by internal rotation or nuclear spins; its constants, those of distortion "
+            "first, may describe the splittings"
+        )
 
     @property
     def table(self) -> AssignedPeaks:

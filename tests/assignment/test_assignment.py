@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -55,6 +56,29 @@ def test_lines_and_what_is_left(answer: AssignAnswer) -> None:
     )
     assert np.abs(columns["residual_mhz"][assigned]).max() < 0.05  # ten times the errors of 5 kHz
     assert np.isnan(columns["residual_mhz"][~assigned]).all()
+
+
+def test_lines_that_look_split_have_a_note(answer: AssignAnswer) -> None:
+    """A species took 17 of 131 peaks of a spectrum with 14N, A and E without a word on their neighbours."""
+    assert answer.notes == ()  # foreign peaks alone are near by chance
+    peaks, best = answer.request.peaks, answer.species[0]
+    assigned = np.unique(best.peak)[:20]
+    frequency = np.concatenate([peaks.frequency_mhz, peaks.frequency_mhz[assigned] + 1.3])
+    height = np.concatenate([peaks.intensity, 0.7 * peaks.intensity[assigned]])
+    order = np.argsort(frequency)
+    split = peak_list(frequency, height, 0.005, band_mhz=BAND)
+    place = np.argsort(order)
+    unexplained = np.concatenate([answer.unexplained, np.ones(20, dtype=bool)])[order]
+    spurs_of_split = np.zeros(len(split), dtype=bool)
+    species = (replace(best, peak=place[best.peak]),)
+    (note,) = AssignAnswer(replace(answer.request, peaks=split), species, unexplained, spurs_of_split).notes
+    found = re.match(
+        r"species 1: (\d+) of its (\d+) peaks have an unassigned peak of similar height within 3 MHz", note
+    )
+    assert found is not None
+    assert 20 <= int(found[1]) < 30
+    assert int(found[2]) == len(np.unique(best.peak))
+    assert "look split, by internal rotation or nuclear spins" in note
 
 
 def test_lines_are_ready_for_a_fit(answer: AssignAnswer, tmp_path: Path) -> None:

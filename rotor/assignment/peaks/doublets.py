@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.assignment.peaks.peak_list import PeakList
 
 WIDEST_MHZ = 3.0
 UNLIKE = 2.5  # smallest ratio of intensities of two peaks that are not a doublet
+AROUND = 30.0  # of WIDEST_MHZ: the density of peaks is that within so many to both sides
+LEAST_SPLIT, SPREADS = (
+    5,
+    4.0,
+)  # lines with a near peak, and standard deviations above chance, from which on lines look split
 
 
 def with_centres(peaks: PeakList, alone: bool = False) -> tuple[PeakList, Ints]:
@@ -46,3 +53,28 @@ def with_centres(peaks: PeakList, alone: bool = False) -> tuple[PeakList, Ints]:
         stated_windows=peaks.windows,
     )  # fmt: skip
     return doubled, both[order]
+
+
+def split_lines(peaks: PeakList, assigned: Ints, left: NDArray[np.bool_]) -> tuple[int, float]:
+    """Number of assigned peaks with an unassigned one of similar height within 3 MHz, and the number expected by chance.
+
+    assigned: peaks of lines. left (n,): peaks without a species. The chance follows from the density of such peaks within 90 MHz.
+    """
+    f, height = peaks.frequency_mhz, peaks.intensity
+    near, expected = 0, 0.0
+    for peak in np.unique(assigned).tolist():
+        ratio = height / height[peak]
+        distance = np.abs(f - f[peak])[left & (ratio < UNLIKE) & (ratio > 1 / UNLIKE)]
+        near += bool((distance < WIDEST_MHZ).any())
+        around = (distance >= WIDEST_MHZ) & (distance < AROUND * WIDEST_MHZ)
+        expected += -math.expm1(-float(around.sum()) / (AROUND - 1))
+    return near, expected
+
+
+def look_split(near: int, expected: float) -> bool:
+    """Whether more lines have a near peak than chance explains.
+
+    >>> look_split(12, 1.0), look_split(4, 0.1), look_split(12, 9.0)
+    (True, False, False)
+    """
+    return near >= LEAST_SPLIT and near > expected + SPREADS * math.sqrt(expected)
