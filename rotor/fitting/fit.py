@@ -211,7 +211,7 @@ def _constants(
 
 def _held_barrier(parameters: Parameters) -> str:
     """Constants of an internal rotor that were held and may have made rotational constants cross, with the remedy; empty without any."""
-    moves = parameters.matrix.any(axis=1)
+    moves = np.asarray(parameters.matrix.any(axis=1)).tolist()
     held = [name for name, free in zip(parameters.constant_names, moves, strict=True) if not free]
     rotor = [name for name in held if re.fullmatch(r"(V3|rho|F0?)(_\d)?", name)]
     if not rotor:

@@ -122,7 +122,7 @@ def joined_data(*terms: ErrorTerm) -> ErrorTerm:
     """
     estimated = sorted((term for term in terms if term.value), key=lambda term: -(term.value or 0.0))
     if not_estimated := [term.source for term in terms if term.value is None]:
-        sizes = [f"{term.source} {size_text(term.value, 'MHz')}" for term in estimated]
+        sizes = [f"{term.source} {size_text(term.value or 0.0, 'MHz')}" for term in estimated]
         return ErrorTerm(None, "; ".join([*not_estimated, *sizes]))
     if not estimated:
         return ErrorTerm(0.0, "; ".join(term.source for term in terms) or NO_UNCERTAINTIES)
