@@ -7,11 +7,10 @@ c · J^2p Jz^2q), so that a Hamiltonian is a table {(p, q, n): c in MHz}. `rotor
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.tops.constants.operators import Operators, Powers, added, axis_order, distortion_terms, spelled_powers
+from rotor.tops.constants.operators import Operators, added, axis_order, distortion_terms, spelled_powers
 
 if TYPE_CHECKING:
     from rotor.tops.constants.constants import Constants
@@ -36,7 +35,12 @@ def operators_of_name(constants: Constants, name: str) -> Operators:
     {(2, 0, 0): -1.0}
     """
     table = _rigid_terms(constants) | distortion_terms(constants.kind, constants.reduction)
-    return table[name] if name in table else {_powers(name): 1.0}
+    if name in table:
+        return table[name]
+    powers = spelled_powers(name)
+    if powers is None:
+        raise ValueError(f"{name} has no operator here")
+    return {powers: 1.0}
 
 
 def order_of_constant(name: str, constants: Constants) -> int:
@@ -51,14 +55,6 @@ def to_order(top: Top, order: int) -> Top:
         name: None for name in constants.values if name not in "ABC" and order_of_constant(name, constants) > order
     }
     return top.with_constants(constants.replace(**above))
-
-
-def _powers(name: str) -> Powers:
-    """Powers (p, q, n) of a name that spells its operator."""
-    powers = spelled_powers(name)
-    if powers is None:
-        raise ValueError(f"{name} has no operator here")
-    return powers
 
 
 def _rigid_terms(constants: Constants) -> dict[str, Operators]:
@@ -80,51 +76,52 @@ def _rigid_terms(constants: Constants) -> dict[str, Operators]:
     }
 
 
-def _added(constants: Constants, names: Iterable[str]) -> Operators:
-    """Sum of the operators of these constants."""
-    return added((operators_of_name(constants, name), constants.values[name]) for name in names)
+def _added(constants: Constants, rigid: bool) -> Operators:
+    """Sum of the operators of A, B, C, or of those of distortion."""
+    values = constants.values.items()
+    return added((operators_of_name(constants, name), value) for name, value in values if (name in "ABC") == rigid)
 
 
 def rigid_operators(constants: Constants) -> Operators:
     """The terms of A, B, C."""
-    return _added(constants, [name for name in constants.values if name in "ABC"])
+    return _added(constants, True)
 
 
 def centrifugal_operators(constants: Constants) -> Operators:
     """The distortion terms in the reduction and representation of the constants, spelled operators included."""
-    return _added(constants, [name for name in constants.values if name not in "ABC"])
+    return _added(constants, False)
 
 
-class Rigid(QuantumEffect):
+class _SemiRigid(QuantumEffect):
+    """Constants of the top: A, B, C if `rigid`, else those of distortion."""
+
+    rigid: ClassVar[bool]
+
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The constants in MHz, as far as the set has them."""
+        return {name: value for name, value in top.constants.values.items() if (name in "ABC") == self.rigid}
+
+    def operators(self, top: Top) -> dict[str, Operators]:
+        """∂H/∂c of the constants."""
+        return {name: operators_of_name(top.constants, name) for name in self.parameters(top)}
+
+
+class Rigid(_SemiRigid):
     """The rigid rotor: A, B, C."""
 
     name = "rigid rotor"
-
-    def parameters(self, top: Top) -> dict[str, float]:
-        """A, B, C in MHz, as far as the set has them."""
-        return {name: value for name, value in top.constants.values.items() if name in "ABC"}
-
-    def operators(self, top: Top) -> dict[str, Operators]:
-        """∂H/∂A, ∂H/∂B, ∂H/∂C."""
-        return {name: terms for name, terms in operators_by_name(top.constants).items() if name in "ABC"}
+    rigid = True
 
     def size_mhz(self, top: Top, j: int) -> float:
         """The bound A J(J+1) of the rigid energy."""
         return max(self.parameters(top).values()) * j * (j + 1)
 
 
-class Centrifugal(QuantumEffect):
+class Centrifugal(_SemiRigid):
     """Centrifugal distortion of all orders of the constants."""
 
     name = "centrifugal distortion"
-
-    def parameters(self, top: Top) -> dict[str, float]:
-        """The distortion constants in MHz."""
-        return {name: value for name, value in top.constants.values.items() if name not in "ABC"}
-
-    def operators(self, top: Top) -> dict[str, Operators]:
-        """∂H/∂c of the distortion constants."""
-        return {name: terms for name, terms in operators_by_name(top.constants).items() if name not in "ABC"}
+    rigid = False
 
     def size_mhz(self, top: Top, j: int) -> float:
         """The sum of the absolute values of all terms at K = J."""

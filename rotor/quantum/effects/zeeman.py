@@ -217,14 +217,10 @@ class ZeemanRequest:
             return requested
         if unknown := sorted(requested.keys() - constants.twice.keys()):
             raise ValueError(f"nuclear_g: {', '.join(unknown)}: the spins of this top are {', '.join(constants.twice)}")
-        return {name: _finite(name, requested[name]) if name in requested else _g_of(name) for name in constants.twice}
-
-
-def _finite(name: str, value: float) -> float:
-    """The value; ValueError unless it is finite."""
-    if not math.isfinite(value):
-        raise ValueError(f"nuclear_g: {name} = {value}: a finite number is expected")
-    return float(value)
+        for name, value in requested.items():
+            if not math.isfinite(value):
+                raise ValueError(f"nuclear_g: {name} = {value}: a finite number is expected")
+        return {name: float(requested[name]) if name in requested else _g_of(name) for name in constants.twice}
 
 
 def _g_of(name: str) -> float:
@@ -288,13 +284,5 @@ def magnetic_limits(request: ZeemanRequest) -> list[Limit]:
 
 
 def answer_zeeman(request: ZeemanRequest, executor: Executor | None = None) -> ZeemanAnswer:
-    """The map of a request. executor: solves blocks of states in parallel.
-
-    >>> from rotor.tops.magnetic import MagneticTensors, tensor_for
-    >>> from rotor.tops.top import Top
-    >>> rod = Top.from_constants("B=6000 MHz", magnetic=MagneticTensors(tensor_for("linear", [-0.03])))
-    >>> states = answer_zeeman(ZeemanRequest(rod, (0.0, 1.0), j_highest=1)).states
-    >>> (states.energy_mhz[states.curve("1", 1)] - 12000).round(4).tolist()  # 0.03 μ_N B
-    [0.0, 0.2287]
-    """
+    """The map of a request; `zeeman_map` has an example. executor: solves blocks of states in parallel."""
     return ZeemanAnswer(request, field_map(request.map, request.jmax, executor))

@@ -339,9 +339,8 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
         return Limit("internal rotation", max(unknown), text, at_most=True)
     least = min(groups, key=lambda group: group.rotor.barrier_mhz / group.rotor.f_mhz)
     barrier, rotor, j = least.barrier, least.rotor, min(j, HIGHEST_J)
-    shifts = line_shifts(top.rotational_constants_mhz, rotor, j)
-    lines = {"within one K": shifts.same, "between two K": shifts.other}
-    sizes = [(where, float(np.median(np.abs(splittings)))) for where, splittings in lines.items()]
+    lines = zip(("within one K", "between two K"), line_shifts(top.rotational_constants_mhz, rotor, j), strict=True)
+    sizes = [(where, float(np.median(np.abs(splittings)))) for where, splittings in lines]
     dipole = np.array(top.dipole_abc_debye or (0.0, 0.0, 0.0))
     if dipole @ dipole > 2 * dipole[0] ** 2:
         sizes.reverse()

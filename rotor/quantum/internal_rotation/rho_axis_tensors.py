@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes
+from rotor.quantum.internal_rotation.terms import AXES, PRINCIPAL, Axes
 from rotor.quantum.operators.algebra import Operator, half_anticommutator
-from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
+from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.operators.tensors import cartesian_of, spherical_components
 from rotor.quantum.spins.scheme import Cosines, CosinesWithN, Rotor
 
@@ -55,8 +55,7 @@ def operator_beside_spins(rotor: Rotor, frame: Axes) -> Operator:
     if isinstance(rotor, Cosines):
         return body_tensor(_real(spherical_components(matrix, 2, REPRESENTATION)))
     vectors = [body_tensor(_real(spherical_components(column, 1, REPRESENTATION))) for column in matrix.T]
-    pairs = zip(vectors, (j_z(), j_x(), j_y()), strict=True)
-    return sum((half_anticommutator(vector, along) for vector, along in pairs), Operator())
+    return sum((half_anticommutator(vector, axis) for vector, axis in zip(vectors, AXES, strict=True)), Operator())
 
 
 def _real(components: NDArray[Any]) -> NDArray[Any]:

@@ -25,13 +25,11 @@ from rotor.quantum.internal_rotation.exchange import TURNS, ExchangedTops, excha
 from rotor.quantum.internal_rotation.frames import IN_PLANE, torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
-from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes, products_of
+from rotor.quantum.internal_rotation.terms import AXES, PRINCIPAL, Axes, component_along, products_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
-from rotor.quantum.operators.rotation import j_x, j_y, j_z
 from rotor.quantum.torsion import cosine, p_alpha, sine
 from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS, PAIRS, sigma_species
 
-AXES = (j_z(), j_x(), j_y())  # P along a, b, c
 EACH = 9  # functions of each top from which products are formed
 ALIKE = 1e-4  # largest difference of the directions (radian) and constants (relative) of equivalent tops: five digits of a file
 Species = tuple[int, ...]  # σ of each top: 0, 1 or -1
@@ -232,10 +230,7 @@ class SeveralTops:
     @property
     def _along(self) -> list[Operator]:
         """ρ_i·P of each top."""
-        return [
-            sum((value * axis for value, axis in zip(top.rho_abc, AXES, strict=True) if value), Operator())
-            for top in self.tops
-        ]
+        return [component_along(top.rho_abc) for top in self.tops]
 
     def slopes_by_rho(self, species: Species) -> dict[str, list[Product]]:
         """∂H/∂ρ_ig = Σ_j F_ij (-2 p_j P_g + {ρ_j·P, P_g}), F_ii = F_i, by the names rho_1a, rho_1b, ..."""

@@ -21,7 +21,7 @@ commute as ½{ , }.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 
@@ -39,7 +39,7 @@ from rotor.quantum.torsion import cosine, p_alpha, sine
 from rotor.tops.constants.operators import Operators, distortion_terms
 from rotor.tops.internal_rotation import BARRIERS, NAMED, SPELLED
 
-Rows = tuple[tuple[float, float, float], ...]
+AXES = (j_z(), j_x(), j_y())  # P along z, x, y; along a, b, c in principal axes
 MOST_STEPS = 4  # J whose elements show the phase of operators with up to eight steps of K
 
 
@@ -47,7 +47,7 @@ MOST_STEPS = 4  # J whose elements show the phase of operators with up to eight 
 class Axes:
     """Components of P along a, b, c, as operators in the frame whose z is along ρ. rows: the axes z, x, y of that frame along a, b, c."""
 
-    rows: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    rows: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     @classmethod
     def along(cls, rho_abc: ArrayLike) -> Axes:
@@ -56,8 +56,7 @@ class Axes:
 
     @classmethod
     def _of(cls, matrix: Floats) -> Axes:
-        first, second, third = (tuple(row) for row in matrix.tolist())
-        return cls((first, second, third))
+        return cls(tuple(map(tuple, matrix.tolist())))
 
     @property
     def matrix(self) -> Floats:
@@ -80,8 +79,7 @@ class Axes:
 
     def component(self, letter: str) -> Operator:
         """Pa, Pb or Pc from Pz, Px, Py."""
-        cosines = [row["abc".index(letter)] for row in self.rows]
-        return sum((x * axis for x, axis in zip(cosines, (j_z(), j_x(), j_y()), strict=True) if x), Operator())
+        return component_along(row["abc".index(letter)] for row in self.rows)
 
     def distortion(self, operators: Operators) -> Operator:
         """Σ c P^2p ½[Pa^2q, P₊^2n + P₋^2n]₊ over a table {(p, q, n): c}, P± = Pb ∓ i Pc stepping along a."""
@@ -98,6 +96,11 @@ class Axes:
 
 
 PRINCIPAL = Axes()
+
+
+def component_along(vector: Iterable[float]) -> Operator:
+    """The scalar product of P with a vector along z, x, y."""
+    return sum((x * axis for x, axis in zip(vector, AXES, strict=True) if x), Operator())
 
 
 def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product, ...]:
