@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -98,24 +99,26 @@ def to_representation(constants: Constants, representation: str, covariance: Cov
 def _converted(
     constants: Constants, reduction: str | None, representation: str, covariance: Covariance | None
 ) -> Conversion:
+    """The new set, in which every constant's source says that it was converted; without a covariance errors stay."""
     _refuse(constants, reduction, representation)
-    covariance = covariance or Covariance.from_uncertainties(constants)
+    covariance, errors = covariance or Covariance.from_uncertainties(constants), dict(constants.uncertainties)
     if {*constants.values} <= {*"ABC"}:
+        values, s = dict(constants.values), 0.0
         note = f"rigid top in {constants.representation} to {representation}, where A, B, C are the same"
-        same = _labelled(constants, dict(constants.values), reduction, representation, note)
-        return Conversion(same, 0.0, note, covariance)
-
-    way = (str(constants.representation), str(reduction), representation)
-    values, s = _values(constants, constants.values, *way)
-    note = (
-        f"{constants.reduction} in {constants.representation} to {reduction} in {representation}, to first order in the "
-        f"quartic constants, s111 = {4 * s:.3g}; it holds while |s111| J³ is far below 1"
-    )
-    if covariance is not None:
-        covariance = _carried(constants, covariance, way)
-    return Conversion(
-        _labelled(constants, values, reduction, representation, note, covariance), 4 * s, note, covariance
-    )
+    else:
+        way = (str(constants.representation), str(reduction), representation)
+        values, s = _values(constants, constants.values, *way)
+        note = (
+            f"{constants.reduction} in {constants.representation} to {reduction} in {representation}, to first order in the "
+            f"quartic constants, s111 = {4 * s:.3g}; it holds while |s111| J³ is far below 1"
+        )
+        if covariance is not None:
+            covariance = _carried(constants, covariance, way)
+            errors = dict(zip(covariance.names, np.sqrt(np.diag(covariance.matrix_mhz2)).tolist(), strict=True))
+    sources = dict.fromkeys(values, f"converted: {note}")
+    sources |= {name: f"{sources[name]}; {old}" for name, old in constants.sources.items() if name in values}
+    settings: Any = {"reduction": reduction, "representation": representation, "kind": "asymmetric", **values}
+    return Conversion(Constants(**settings, uncertainties=errors, sources=sources), 4 * s, note, covariance)
 
 
 def _values(
@@ -205,21 +208,3 @@ def _named(operators: Operators, reduction: str, representation: str) -> dict[st
         ((powers, sign),) = term.items()
         values[name] = sign * operators[powers]
     return values
-
-
-def _labelled(
-    constants: Constants,
-    values: dict[str, float],
-    reduction: str | None,
-    representation: str,
-    note: str,
-    covariance: Covariance | None = None,
-) -> Constants:
-    """The new set, in which every constant's source says that it was converted; without a covariance errors stay."""
-    sources = dict.fromkeys(values, f"converted: {note}")
-    sources |= {name: f"{sources[name]}; {old}" for name, old in constants.sources.items() if name in values}
-    errors = dict(constants.uncertainties)
-    if covariance is not None:
-        errors = dict(zip(covariance.names, np.sqrt(np.diag(covariance.matrix_mhz2)).tolist(), strict=True))
-    settings = {"reduction": reduction, "representation": representation, "kind": "asymmetric"}
-    return Constants(**settings, uncertainties=errors, sources=sources, **values)  # type: ignore[arg-type]

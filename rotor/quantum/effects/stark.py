@@ -287,8 +287,16 @@ class StarkAnswer(MapAnswer):
         }
 
     def field_limits(self) -> list[Limit]:
-        """The polarization by the static field."""
-        return static_polarization(self.request.top, float(np.abs(self.states.fields).max()))
+        """The polarization by the static field; nothing without a field."""
+        name, tensor = "polarization by the static field", self.request.top.polarizability_abc_angstrom3
+        strongest = float(np.abs(self.states.fields).max())
+        if not strongest:
+            return []
+        if tensor is None:
+            return [Limit(name, None, "the polarizability is not known")]
+        size = MHZ_PER_ANGSTROM3 * float(np.abs(np.linalg.eigvalsh(np.array(tensor))).max()) * strongest**2
+        text = f"all levels are lower by about so much in {strongest:g} kV/cm, lines shift only by what differs between them"
+        return [Limit(name, size, text)]
 
     def moment_terms(self) -> list[ErrorTerm]:
         """Errors of the dipole, and of the polarizability in light."""
@@ -307,24 +315,6 @@ def answer_stark(request: StarkRequest, executor: Executor | None = None) -> Sta
     [0.0, -3.449]
     """
     return StarkAnswer(request, field_map(request.map, request.jmax, executor))
-
-
-def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
-    """The polarization of a top by a static field; nothing without a field.
-
-    >>> from rotor.tops.top import Top
-    >>> rod = Top.from_constants("B=6000 MHz", polarizability_abc_angstrom3=((8, 0, 0), (0, 4, 0), (0, 0, 4)))
-    >>> round(static_polarization(rod, 100.0)[0].size_mhz, 3)
-    67.168
-    """
-    if not strongest_kv_per_cm:
-        return []
-    text = f"all levels are lower by about so much in {strongest_kv_per_cm:g} kV/cm, lines shift only by what differs between them"
-    name, tensor = "polarization by the static field", top.polarizability_abc_angstrom3
-    if tensor is None:
-        return [Limit(name, None, "the polarizability is not known")]
-    largest = float(np.abs(np.linalg.eigvalsh(np.array(tensor))).max())
-    return [Limit(name, MHZ_PER_ANGSTROM3 * largest * strongest_kv_per_cm**2, text)]
 
 
 def dipole_term(top: Top, states: FieldMap) -> ErrorTerm:

@@ -85,14 +85,14 @@ def label_value(name: str, value: int, half: bool = False) -> str:
     return letters.get(value, str(value)) if name == "species" else value_text(value, half)
 
 
-def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), width: int = 2) -> list[str]:
-    """Each of the levels `rows` as its quantum numbers in a row of text; `halves` are the doubled columns, `width` the least of a number.
+def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = ()) -> list[str]:
+    """Each of the levels `rows` as its quantum numbers in a row of text; `halves` are the doubled columns.
 
     >>> labels({"j": np.array([4]), "ka": np.array([1]), "kc": np.array([3])}, np.array([0]))
     [' 4  1  3']
     """
     texts = [
-        [f"{value_text(value, name in halves):>{width}}" for value in column[rows].tolist()]
+        [f"{value_text(value, name in halves):>2}" for value in column[rows].tolist()]
         for name, column in quanta.items()
     ]
     return [" ".join(row) for row in zip(*texts, strict=True)]

@@ -204,13 +204,13 @@ def _named(states: States, members: Members) -> Iterator[tuple[int, Floats, Floa
     """Number, energies, vectors over parts, labels and mixing of each solved block of one size."""
     names, sizes = members.alike(states.numbers)
     vectors: Sequence[Floats] | Floats = states.vectors
+    over = states.vectors
     if not members.allowed:
         over = over_functions(members.parts, states.numbers, states.vectors)
-        labels, mixing = labels_by_shares(names, sizes, over)
     else:
-        labels, mixing = labels_by_shares(names, sizes, states.vectors)
         products = (members.allowed[number].products for number in states.numbers)
         vectors = [of_block @ mixtures for of_block, mixtures in zip(products, states.vectors, strict=True)]
+    labels, mixing = labels_by_shares(names, sizes, over)
     yield from zip(states.numbers, states.energies_mhz, vectors, labels, mixing, strict=True)
 
 
