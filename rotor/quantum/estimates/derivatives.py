@@ -40,7 +40,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=10 B=6 C=4 MHz")
-    >>> level_derivatives(top, solve_levels(top, 1)).round(12).tolist()[1:]
+    >>> (level_derivatives(top, solve_levels(top, 1)).round(12) + 0.0).tolist()[1:]
     [[0.0, 1.0, 1.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]
     """
     by_name = parameter_operators(top, levels.effects)
