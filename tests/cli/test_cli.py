@@ -605,8 +605,8 @@ def test_a_forgotten_unit_is_named(call):
 
 
 def test_what_a_unit_that_is_not_last_means_is_said(call):
-    """Only a unit at the end serves the constants without one; --help, a note and the error on the order say so."""
-    rule = "only a unit at the end serves the constants without one"
+    """Only a unit at the end applies to the constants without one; --help, a note and the error on the order say so."""
+    rule = "only a unit at the end applies to the constants without one"
     code, _, err = call("info", "--constants", "A=9 GHz B=3 C=2")
     assert (code, f"note: --constants: GHz is the unit of A alone, and B, C are in MHz: {rule}" in err) == (0, True)
     code, _, err = call("info", "--constants", "A=9 B=3 C=2 GHz DeltaJ=1 kHz")
@@ -614,7 +614,7 @@ def test_what_a_unit_that_is_not_last_means_is_said(call):
     assert f"exchange them; GHz is the unit of C alone, and A, B are in kHz: {rule}" in err
     code, _, err = call("info", "--constants", "A=9 GHz B=4 GHz C=3 GHz")
     assert (code, rule in err) == (0, False)
-    assert "only a unit at the end serves all" in " ".join(call("info", "--help")[1].split())
+    assert "only a unit at the end applies to all" in " ".join(call("info", "--help")[1].split())
 
 
 def test_a_smiles_without_its_prefix_is_recognized(call):

@@ -58,9 +58,9 @@ def mixed_units(text: str) -> str:
     """Which constants have which unit, for a text with units at some constants before the last; "" for other texts.
 
     >>> mixed_units("A=9 GHz B=3 C=2")
-    'GHz is the unit of A alone, and B, C are in MHz: only a unit at the end serves the constants without one'
+    'GHz is the unit of A alone, and B, C are in MHz: only a unit at the end applies to the constants without one'
     >>> mixed_units("A=9 B=3 C=2 GHz DeltaJ=1 kHz")
-    'GHz is the unit of C alone, and A, B are in kHz: only a unit at the end serves the constants without one'
+    'GHz is the unit of C alone, and A, B are in kHz: only a unit at the end applies to the constants without one'
     >>> mixed_units("A=9 B=3 C=2 GHz")
     ''
     """
@@ -75,9 +75,7 @@ def mixed_units(text: str) -> str:
         for unit in dict.fromkeys(others.values())
     )
     verb = "is" if len(without) == 1 else "are"
-    return (
-        f"{alone}, and {', '.join(without)} {verb} in {last}: only a unit at the end serves the constants without one"
-    )
+    return f"{alone}, and {', '.join(without)} {verb} in {last}: only a unit at the end applies to the constants without one"
 
 
 def _items(text: str) -> list[re.Match[str]]:

@@ -61,7 +61,7 @@ class MoleculeInput:
         example="water",
     )
     constants: str | None = declared(
-        None, Text(), 'Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz); only a unit at the end serves all',
+        None, Text(), 'Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz); only a unit at the end applies to all',
         "molecule.constants",
         common=True, example="A=9.2 B=3 C=2.5 GHz",
     )  # fmt: skip
