@@ -330,7 +330,8 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
 
     The size is that of the lines which the larger part of the dipole allows: ΔKa = 0 along a, ΔKa = 1 across it.
     """
-    from rotor.quantum.estimates.methyl_groups import are_computed, line_shifts
+    from rotor.quantum.estimates.methyl_groups import line_shifts
+    from rotor.tops.internal_rotation import MOST_TOPS
 
     what = "a methyl group turns" if len(groups) == 1 else f"{len(groups)} methyl groups turn"
     unknown = [group.rotor.f_mhz for group in groups if group.barrier is None]
@@ -353,7 +354,7 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
     )
     if 4 * rotor.barrier_mhz / (9 * rotor.f_mhz) < LOW_BARRIER:
         text += ", so low that no line of the E species fits a rigid top"
-    if top.kind == "asymmetric" and are_computed(groups):
+    if top.kind == "asymmetric" and len(groups) <= MOST_TOPS and all(group.rotor.barrier_mhz for group in groups):
         text += "; internal rotation 'geometry' computes it"
     return Limit("internal rotation", size, text)
 

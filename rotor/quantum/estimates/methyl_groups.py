@@ -27,7 +27,6 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.molecules.molecule import Molecule
-from rotor.tops.internal_rotation import MOST_TOPS
 from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 OFF_AXIS = 0.05  # sine of the angle above which an atom counts as off the axis of a methyl group
@@ -151,11 +150,6 @@ def methyl_groups(molecule: Molecule, bonds: Sequence[Ints]) -> list[MethylGroup
         rotor = rotor_of_moments(top_moment, frame.axes @ axis, frame.moments, height)
         groups.append(MethylGroup(rotor, barrier, tuple(hydrogens)))
     return groups
-
-
-def are_computed(groups: Sequence[MethylGroup]) -> bool:
-    """Whether levels can be computed from the geometry: of up to three groups with barriers."""
-    return len(groups) <= MOST_TOPS and all(group.rotor.barrier_mhz for group in groups)
 
 
 def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Barrier | None:

@@ -103,7 +103,7 @@ class MapAnswer(TextOf):
 
 def constants_term(top: Top, effects: Sequence[QuantumEffect], j: int) -> ErrorTerm:
     """One standard deviation of the free levels up to J = `j` from the uncertainties of the constants."""
-    levels = solve_levels(top, j, effects=effects) if effects else solve_levels(top, j)
+    levels = solve_levels(top, j, effects=effects)
     parameters = parameter_names(top, levels)
     covariance = known_covariance(top, parameters)
     source = source_of_errors(top, parameters, None)
