@@ -204,13 +204,9 @@ class Whole(Reader):
     def read(self, raw: Any) -> int:
         """The number."""
         value = raw
-        if isinstance(raw, str) and re.fullmatch(
-            r"\s*[+-]?[0-9]{1,4000}\s*", raw
-        ):  # int() takes 1_000 and other scripts, too
+        if isinstance(raw, str) and re.fullmatch(r"\s*[+-]?[0-9]{1,4000}\s*", raw):  # int() takes 1_000, too
             value = int(raw)
-        elif isinstance(raw, str) and re.fullmatch(
-            r"\s*[0-9]{1,9}(\.[0-9]{1,9})?[eE]\+?[0-9]{1,2}\s*", raw
-        ):  # such as 1e5
+        elif isinstance(raw, str) and re.fullmatch(r"\s*[+-]?[0-9]{1,9}(\.[0-9]{1,9})?[eE]\+?[0-9]{1,2}\s*", raw):
             number = Decimal(raw.strip())
             value = int(number) if number == number.to_integral_value() else raw
         if isinstance(value, bool) or not hasattr(value, "__index__"):

@@ -233,7 +233,8 @@ class LinearStack:
         shifted = shifted - (np.take_along_axis(energies, states, axis=1) + _ASIDE * largest)[:, None, :]
         shifted = shifted.transpose(1, 0, 2).reshape(size, -1)
         vectors, squares, gamma, _ = twisted(shifted, np.repeat(below.T[1:], most, axis=1), space)
-        if not (np.abs(gamma) <= _RESIDUAL * size * np.repeat(largest, most) * np.sqrt(squares)).all():
+        bound = _RESIDUAL * size * np.repeat(largest, most) * np.sqrt(squares)
+        if not (np.isfinite(squares) & (np.abs(gamma) <= bound)).all():
             return None
         return energies + zero[:, None], vectors.reshape(size, count, most).transpose(1, 0, 2).copy()
 
