@@ -28,18 +28,17 @@ class NewRequest:
 
 def answer(request: NewRequest, _: Any) -> str:
     """The scene, or the schema."""
+    if (request.kind is None) != request.schema:
+        raise ValueError(f"expected either a kind of scene, one of {', '.join(SCENE_VERBS)}, or --schema")
+    if request.kind is not None:
+        from rotor.scenes.template import template
+
+        return template(request.kind)
     from json import dumps
 
     from rotor.scenes.schema import json_schema
-    from rotor.scenes.template import template
 
-    if (request.kind is None) != request.schema:
-        raise ValueError(f"expected either a kind of scene, one of {', '.join(SCENE_VERBS)}, or --schema")
-    return (
-        template(request.kind)
-        if request.kind is not None
-        else f"{dumps(json_schema(), indent=1, ensure_ascii=False)}\n"
-    )
+    return f"{dumps(json_schema(), indent=1, ensure_ascii=False)}\n"
 
 
 def check(_: NewRequest, outputs: Mapping[str, Any], __: Any) -> None:
