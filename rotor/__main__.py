@@ -15,9 +15,9 @@ def start_workers_ahead(arguments: Sequence[str]) -> None:
     if arguments[:1] != ["run"] or not re.search(r"--workers[= ]0*([2-9]|[1-9]\d+)(?!\S)", " ".join(arguments)):
         return
     from rotor.scenes.worker_processes import start_ahead
-    from rotor.verbs import scene_text
+    from rotor.verbs import first_file_text
 
-    start_ahead(scene_text(arguments[1:]))
+    start_ahead(first_file_text(arguments[1:]))
 
 
 def main() -> None:

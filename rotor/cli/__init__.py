@@ -21,7 +21,7 @@ import typer
 
 from rotor.checks import NoAnswerError, RunStopped, require_file
 from rotor.cli import process
-from rotor.verbs import declared_verbs, has_small_blocks, highest_j_in, kind_in, scene_text
+from rotor.verbs import declared_verbs, first_file_text, has_small_blocks, highest_j_in, kind_in
 
 if TYPE_CHECKING:
     from rotor.verbs.common.verb import Verb
@@ -222,7 +222,7 @@ def _limit_threads(verb: str, arguments: Sequence[str]) -> None:
     """One thread of BLAS where the verb, or the kind of its scene, has small blocks. The limit must be set before numpy is loaded."""
     text = " ".join(arguments)
     if verb in WITH_SCENE:
-        text = scene_text(arguments[1:])
+        text = first_file_text(arguments[1:])
         verb = kind_in(text)
     if has_small_blocks(verb):
         process.one_thread_of_blas(highest_j_in(text))

@@ -30,7 +30,7 @@ def has_small_blocks(name: str) -> bool:
     return file.is_file() and "\n    small_blocks=True," in file.read_text(encoding="utf-8")
 
 
-def scene_text(arguments: Sequence[str]) -> str:
+def first_file_text(arguments: Sequence[str]) -> str:
     """The text of the first file among the words of a command; empty where none can be read."""
     with suppress(OSError, ValueError):
         return next((file.read_text(encoding="utf-8") for file in map(Path, arguments) if file.is_file()), "")
